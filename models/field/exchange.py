@@ -37,6 +37,7 @@ OF_MESH: Final = b"# the mesh of a cross field of crossfield: "
 _COMPONENTS: Final = ("ux", "uy", "uz", "vx", "vy", "vz")
 _PER_FACE: Final = 20  # numbers about a face and its vertices in any of these files, and words of a head
 _OPPOSITE: Final = 1e-3  # radians by which the two vectors of a line may fail to be opposite
+_NEAR: Final = 1e-5  # share of the extent by which corners of a mesh may differ: numbers rounded to 6 digits
 _FLAT: Final = 1e-6  # share of a vector that may point out of the plane
 _NUMBERS: Final = re.compile(
     rb"(?:[ \t]*+[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?(?![^ \t]))*+[ \t]*+"
@@ -153,21 +154,47 @@ def _parse_ply(data: bytes, instance: Instance) -> CrossField:
     expected = [f"property double {name}".encode() for name in _COMPONENTS]
     if lines[end - len(expected) : end] != expected:
         raise InstanceError("its faces have no properties ux, uy, uz, vx, vy, vz; give a .ply of crossfield")
-    start = end + 1 + len(mesh.vertices)
-    return _field_of_rows(list(enumerate(lines[start:], start + 1)), 4, instance)
+    faces = end + 1 + len(mesh.vertices)
+    has_all = b"element vertex %d" % len(mesh.vertices) in lines[:end]
+    _check_mesh(lines, end + 1 if has_all else None, faces, instance)
+    return _field_of_rows(list(enumerate(lines[faces:], faces + 1)), 4, instance)
 
 
 def _parse_vtk(data: bytes, instance: Instance) -> CrossField:
     """Read the field of a .vtk with cell vectors u and v. Raises InstanceError that names the line."""
-    lines, count = data.splitlines(), triangle_counts(instance)[0]
-    heads = [
-        k for name in (b"u", b"v") for k, line in enumerate(lines) if line.split()[:2] == [b"VECTORS", name]
-    ]
-    if len(heads) != 2:
+    lines, mesh = data.splitlines(), mesh_of(instance)
+    sections = {b" ".join(line.split()[:2]): k + 1 for k, line in enumerate(lines) if line[:1].isalpha()}
+    heads = [sections.get(b"VECTORS " + name, 0) for name in (b"u", b"v")]
+    if not all(heads):
         raise InstanceError("has no cell vectors u and v as text; give a .vtk of crossfield")
-    u, v = (lines[head + 1 : head + 1 + count] for head in heads)
-    rows = [(heads[0] + 2 + k, b" ".join(pair)) for k, pair in enumerate(zip(u, v, strict=False))]
+    points, faces = b"POINTS %d" % len(mesh.vertices), b"POLYGONS %d" % mesh.size
+    _check_mesh(lines, sections.get(points), sections.get(faces), instance)
+    u, v = (lines[head : head + mesh.size] for head in heads)
+    rows = [(heads[0] + 1 + k, b" ".join(pair)) for k, pair in enumerate(zip(u, v, strict=False))]
     return _field_of_rows(rows, 0, instance)
+
+
+def _check_mesh(lines: list[bytes], points: int | None, faces: int | None, instance: Instance) -> None:
+    """Raise InstanceError unless vertices and faces from two lines of a file on are those of the instance.
+
+    points, faces: None where the file has other numbers of them.
+    """
+    mesh, other = mesh_of(instance), "holds another mesh than the instance; give the instance of this field"
+    if points is None or faces is None:
+        raise InstanceError(other)
+    rows = [*enumerate(lines[points : points + len(mesh.vertices)], points + 1)]
+    vertices = _number_rows(rows, 3, "x y z of a vertex")
+    rows = [
+        (k + 1, b" ".join(lines[k].split()[:4])) for k in range(faces, min(faces + mesh.size, len(lines)))
+    ]
+    corners = _number_rows(rows, 4, "3 and the vertices of a face")[:, 1:].astype(np.int64)
+    near = _NEAR * np.ptp(mesh.vertices, axis=0).max()
+    if (
+        corners.shape != mesh.faces.shape
+        or ((corners < 0) | (corners >= len(vertices))).any()
+        or (np.abs(vertices[corners] - mesh.vertices[mesh.faces]) > near).any()
+    ):
+        raise InstanceError(other)
 
 
 def _field_of_rows(rows: Lines, skipped: int, instance: Instance) -> CrossField:

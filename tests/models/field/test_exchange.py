@@ -11,6 +11,7 @@ from crossfield.models.field.file import read_field, write_field
 from crossfield.models.field.triangles import mesh_of, vectors_of
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.mesh import Mesh
 from crossfield.models.mesh.shapes import MESHES
 from exhaustive import random_field, random_instance
 
@@ -107,6 +108,25 @@ def test_damaged_files_are_refused_with_the_place(suffix, old, new, message, tmp
         read_field(path, on=field.instance)
     with pytest.raises(InputError, match="holds no instance"):
         read_field(path)
+
+
+@pytest.mark.parametrize("suffix", ["ply", "vtk"])
+def test_a_field_of_another_mesh_with_as_many_faces_is_refused(suffix, tmp_path):
+    mesh = Mesh([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
+    instance = Instance.on_faces("plate", mesh, [0], [0.3], [1.0])
+    field = CrossField(instance, [0.3, 0.4], [0, 0], [0])
+    path = write_field(field, tmp_path / f"field.{suffix}")
+    others = [
+        replace(mesh, faces=mesh.faces[::-1]),
+        replace(mesh, vertices=2 * mesh.vertices),
+        replace(mesh, vertices=np.append(mesh.vertices, [[5, 5, 5]], axis=0)),
+        Mesh(mesh.vertices[[0, 1, 2, 2, 3, 0]], [[0, 1, 2], [3, 4, 5]]),
+    ]
+    for other in others:
+        with pytest.raises(InstanceError, match=r"field\.\w+: holds another mesh"):
+            read_field(path, on=replace(instance, domain=other))
+    path.write_text(path.read_text().replace("2.0 1.0 0.0", "2.000001 1 0"))  # saved with other digits
+    assert read_field(path, on=instance).alpha == pytest.approx(field.alpha)
 
 
 @pytest.mark.parametrize("suffix", ["rawfield", "rosy"])
