@@ -1,5 +1,8 @@
 """Functions that Numba compiles on their first call and caches on disk, and threads that share their work.
 
+Caches are in the user's cache folder, or in NUMBA_CACHE_DIR where it is set. In the package they would
+outlive it: pip leaves folders with unknown files, and such a folder hides an editable installation.
+
 Parallel loops of Numba are the alternative. But their threads spin while they wait, which doubled the time on
 a busy machine. The OpenMP threads do not survive a fork, and the built-in ones allow no second thread of
 Python.
@@ -7,24 +10,31 @@ Python.
 
 from __future__ import annotations
 
-import pickle
+import hashlib
+import os
+import re
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
+from functools import cache
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, Final, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.misc.appdirs import AppDirs
 
 from .job_counts import check_jobs
 
 _Part = TypeVar("_Part")
 _Work = TypeVar("_Work", bound=Callable[..., Any])
+_NUMBA: Final[Any] = numba.config
+_FOLDERS: Final = cast("Any", AppDirs)("crossfield", appauthor=False)
 _DISPATCHERS: Final[list[Any]] = []
 _CACHED: Final[set[Any]] = set()  # those that were cached on disk when somebody asked
 _ANY_ORDER: Final = {"reassoc", "nnan", "nsz"}
+_COMPILED: Final = re.compile(rb"^@(compiled|inlined)|NamedTuple", re.MULTILINE)
 _PARTS: Final = 2  # of shared work for each thread: one that takes longer than expected then costs less
 
 
@@ -55,10 +65,35 @@ def inlined(work: _Work) -> _Work:
 def _make_dispatcher(work: _Work, *, fastmath: bool | set[str], no_cpython_wrapper: bool = False) -> _Work:
     options: Any = {"no_cfunc_wrapper": True, "no_cpython_wrapper": no_cpython_wrapper}
     dispatcher: Any = numba.njit(error_model="numpy", nogil=True, fastmath=fastmath, **options)(work)
-    with suppress(RuntimeError):  # no folder is writable
-        dispatcher.enable_caching()
+    folder = _cache_root(Path(work.__code__.co_filename).parent)
+    if folder is not None:
+        chosen, _NUMBA.CACHE_DIR = _NUMBA.CACHE_DIR, str(folder)
+        with suppress(RuntimeError):  # the disk is full
+            dispatcher.enable_caching()
+        _NUMBA.CACHE_DIR = chosen
     _DISPATCHERS.append(dispatcher)
     return cast("_Work", dispatcher)
+
+
+@cache
+def _cache_root(modules: Path) -> Path | None:
+    """The folder for compiled code of the modules in a folder; None where the user can write to none.
+
+    Its name depends on the version of Numba and on all modules with compiled functions or with the tuples
+    that these take. Numba itself compares only the module of a function, not those of the functions it calls.
+    """
+    content = hashlib.sha256(numba.__version__.encode())
+    for path in sorted(modules.glob("*.py")):
+        source = path.read_bytes()
+        if _COMPILED.search(source):
+            content.update(source)
+    user = _NUMBA.CACHE_DIR or _FOLDERS.user_cache_dir
+    folder = Path(user) / f"crossfield-{content.hexdigest()[:16]}"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        return None
+    return folder if os.access(folder, os.W_OK) else None
 
 
 def is_all_compiled(modules: Callable[[str], bool] = lambda _: True) -> bool:
@@ -82,23 +117,7 @@ def _is_cached(dispatcher: Any) -> bool:
     """Whether there is an index of compiled code for the function (`*.nbi`, named after its first line)."""
     code, folder = dispatcher.py_func.__code__, dispatcher.stats.cache_path
     named = f"*.{code.co_name}-{code.co_firstlineno}.*.nbi"
-    return folder is None or any(_is_readable(index) for index in Path(folder).glob(named))
-
-
-def _is_readable(index: Path) -> bool:
-    """Whether an index can be loaded; one that an older version left, with other classes, is removed.
-
-    Numba does not get as far as comparing the age of such an index.
-    """
-    try:
-        with index.open("rb") as stream:
-            pickle.load(stream)  # noqa: S301 - the version of Numba, which wrote the file
-            pickle.load(stream)  # noqa: S301 - signatures, whose types are those of arguments
-    except Exception:  # noqa: BLE001 - pickles raise anything
-        with suppress(OSError):
-            index.unlink()
-        return False
-    return True
+    return folder is None or any(Path(folder).glob(named))
 
 
 class Crew:

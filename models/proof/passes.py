@@ -4,9 +4,7 @@ For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha an
 product is one over beta (models/proof/min_plus.py) and then one over alpha: O(N^3) for N^2 labels. A^2 is
 the least over all jumps of that parity: A is taken modulo pi.
 
-The first call compiles for some 12 s of CPU; cached code loads in 0.3 s. Cached code is not renewed when only
-functions in other files that it calls have changed: delete `*.nbi` then. The names of `State` and
-`Clusters` are part of the cache: after renaming them, old files cannot be read.
+The first call compiles for some 12 s of CPU; cached code loads in 0.3 s.
 """
 
 from __future__ import annotations

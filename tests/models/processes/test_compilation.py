@@ -1,44 +1,76 @@
-"""Compiled functions are cached, and what an older version left in the cache does no harm."""
+"""Compiled functions are cached for the user, outside the package, and never taken from another version."""
 
+import os
 import subprocess
 import sys
 
 import pytest
 
-OLDER = """from typing import NamedTuple
-from crossfield.models.processes.compilation import compiled, is_all_compiled
+LATER = """from typing import NamedTuple
+from crossfield.models.processes.compilation import compiled
+from earlier import times
 
 class {name}(NamedTuple):
     a: float
 
 @compiled
-def twice(terms):
-    return 2 * terms.a
+def scaled(terms):
+    return times(terms.a)
+"""
+EARLIER = """from crossfield.models.processes.compilation import compiled
+
+@compiled
+def times(value):
+    return {factor} * value
 """
 CALL = """
-from older import twice, {name}
+from later import scaled, {name}
 from crossfield.models.processes.compilation import is_all_compiled
-print(is_all_compiled(), twice({name}(2.0)), is_all_compiled())
+print(is_all_compiled(), scaled({name}(2.0)), is_all_compiled())
 """
 
 
 @pytest.fixture
-def call(tmp_path, monkeypatch):
-    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+def call(tmp_path):
+    modules = tmp_path / "modules"
+    modules.mkdir()
 
-    def run(name):
-        (tmp_path / "older.py").write_text(OLDER.format(name=name))
+    def run(name="Terms", factor=2.0, **variables):
+        (modules / "later.py").write_text(LATER.format(name=name))
+        (modules / "earlier.py").write_text(EARLIER.format(factor=factor))
+        settings = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
+        settings |= variables or {"XDG_CACHE_HOME": str(tmp_path / "cache")}
         code = CALL.format(name=name)
         run = subprocess.run(
-            [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+            [sys.executable, "-c", code],
+            cwd=modules,
+            env=settings,
+            capture_output=True,
+            text=True,
+            check=False,
         )
         assert run.returncode == 0, run.stderr
+        assert not [*modules.rglob("*.nb?")]
         return run.stdout.split()
 
     return run
 
 
-def test_a_class_with_another_name_makes_functions_compile_again(call, tmp_path):
-    assert call("Terms") == ["False", "4.0", "True"]
-    assert call("Terms") == ["True", "4.0", "True"]
-    assert call("Weights") == ["False", "4.0", "True"]
+@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "NUMBA_CACHE_DIR"])
+def test_code_is_cached_in_the_folder_of_the_user(call, tmp_path, variable):
+    folder = {variable: str(tmp_path / "mine")}
+    assert call(**folder) == ["False", "4.0", "True"]
+    assert call(**folder) == ["True", "4.0", "True"]
+    assert len([*(tmp_path / "mine").rglob("*.nbi")]) == 2
+
+
+def test_code_of_another_version_is_compiled_again(call):
+    assert call() == ["False", "4.0", "True"]
+    assert call(name="Weights") == ["False", "4.0", "True"]
+    assert call(factor=3.0) == ["False", "6.0", "True"]  # Numba compares the file of the caller only
+    assert call() == ["True", "4.0", "True"]
+
+
+def test_functions_work_where_no_folder_is_writable(call, tmp_path):
+    (tmp_path / "file").touch()
+    assert call(XDG_CACHE_HOME=str(tmp_path / "file" / "cache")) == ["True", "4.0", "True"]
