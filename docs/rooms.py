@@ -26,7 +26,7 @@ ORDER: Final = (
     "export/solving", "export/verify", "export/studio",
     "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
     "export/library/building", "export/library/contributions",
-    "export/library/site", "export/cli",
+    "export/cli",
 )  # fmt: skip
 """From the ground up: a folder uses only earlier folders."""
 

@@ -1,7 +1,7 @@
 """Layouts of texts, in Jinja2.
 
-models: model files; library: texts of a library; site: its pages; run: the page of a run. Layout only: every
-line of bulk is streamed in.
+models: model files; library: texts of a library and its page; run: the page of a run; page: the style of
+pages. Layout only: every line of bulk is streamed in.
 """
 
 from __future__ import annotations

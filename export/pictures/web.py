@@ -1,4 +1,4 @@
-"""Pictures for a web site; same input, same bytes.
+"""Pictures for web pages; same input, same bytes.
 
 Those of pixels are SVG in the reader's light or dark mode, those of meshes PNG without a background.
 """
@@ -15,7 +15,7 @@ from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
 from .draw import fixed_settings
-from .marks import PAPER, STROKE, Area, GridFrame, Layer, Lines, Mark, Sheet
+from .marks import PAPER, Area, GridFrame, Layer, Lines, Mark, Sheet
 from .mesh_view import draw_mesh
 from .palette import DARK, LIGHT
 from .svg import web_sheet_svg
@@ -24,11 +24,9 @@ _SIDE: Final = 320.0
 CROSSES_UP_TO: Final = 12  # longer side of a grid with crosses at all pixels; larger ones have streamlines
 _GRID: Final = "#e4e6ea"
 _EDGE: Final = "#8b929c"
-_SHADE: Final = "#e1e4e9"
 _FAINT: Final = "#d3d6db"
 _NIGHT: Final = {LIGHT[mark]: DARK[mark] for mark in LIGHT} | {  # colours in dark mode by those in light mode
     PAPER: "#1d2126",
-    _SHADE: "#3a424c",
     _GRID: "#30363d",
     _EDGE: "#7d8590",
     _FAINT: "#3d444d",
@@ -36,30 +34,13 @@ _NIGHT: Final = {LIGHT[mark]: DARK[mark] for mark in LIGHT} | {  # colours in da
 _MARGIN: Final = 7.0
 _SPACING: Final = 10.0  # between streamlines of one family
 _CELLS_FROM: Final = 9.0  # units of a pixel from which on its sides are drawn
-_MESH_SIDES: Final = (640, 56)  # dots per side of a picture of a mesh, and of a thumbnail
-
-
-def instance_picture(instance: Instance) -> bytes:
-    """Mask, pixels and strokes: the more reliable a stroke, the stronger its line."""
-    if isinstance(instance.domain, Mesh):
-        return _mesh_picture(instance, _MESH_SIDES[0])
-    frame = _web_frame(instance)
-    width = float(np.clip(0.2 * frame.pixel, 2.0, 6.0))
-    return _page_around_mask(frame, [*_mask_marks(frame), *frame.strokes(STROKE, width)])
-
-
-def thumbnail(instance: Instance) -> bytes:
-    """Silhouette and strokes with lines that are visible at the height of a line of text."""
-    if isinstance(instance.domain, Mesh):
-        return _mesh_picture(instance, _MESH_SIDES[1])
-    frame = _web_frame(instance)
-    return _page_around_mask(frame, [frame.area(_SHADE, instance.mask), *frame.strokes(STROKE, 12.0)])
+_MESH_SIDE: Final = 640  # dots per side of a picture of a mesh
 
 
 def field_picture(field: CrossField) -> bytes:
     """Crosses or, on a larger grid, streamlines over faint strokes; singularities red (+) and blue (-)."""
     if isinstance(field.instance.domain, Mesh):
-        return _mesh_picture(field, _MESH_SIDES[0])
+        return _mesh_picture(field)
     frame = _web_frame(field.instance)
     few = max(field.instance.mask.shape) <= CROSSES_UP_TO
     lines = (
@@ -69,14 +50,16 @@ def field_picture(field: CrossField) -> bytes:
     return _page_around_mask(frame, [*_mask_marks(frame), *strokes, *lines, *frame.singularities(field, 4.6)])
 
 
-def _mesh_picture(subject: CrossField | Instance, side: int) -> bytes:
+def _mesh_picture(field: CrossField) -> bytes:
     from matplotlib.figure import Figure
 
     stream, inches = io.BytesIO(), 4.0
     with fixed_settings():
         figure = Figure(figsize=(inches, inches))
-        draw_mesh(figure.add_axes((0.0, 0.0, 1.0, 1.0)), subject)
-        figure.savefig(stream, format="png", dpi=side / inches, transparent=True, metadata={"Software": None})
+        draw_mesh(figure.add_axes((0.0, 0.0, 1.0, 1.0)), field)
+        figure.savefig(
+            stream, format="png", dpi=_MESH_SIDE / inches, transparent=True, metadata={"Software": None}
+        )
     return stream.getvalue()
 
 

@@ -1,18 +1,20 @@
-"""The files about a library as a whole: texts, drawings, checker, optima, index and SHA256SUMS."""
+"""The files about a library as a whole: texts, pictures, drawings, checkers, optima, index and SHA256SUMS."""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.proof import check_certificate, check_orthogonal
 from ....models.storage import read_bytes, write_bytes
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, program_version
+from ...pictures.web import field_picture
 from ...writing.records import number_text
 from ..documents import check_point
 from ..documents.checksums import is_intact, write_checksums
@@ -31,11 +33,11 @@ from ..documents.standalone import standalone_program
 from ..ledger.ledger import LEDGER, read_ledger
 from ..plan.recipe import NORMS, InstancePlan, norm_minimised
 from ..plan.spec import RUNGS, Spec
-from .table import TABLE, table
+from .table import TABLE, instance_name, table
 
 CHECKER: Final = "check_point.py"
 SOLU: Final = "library.solu"
-TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md")
+TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "index.html")
 
 _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 
@@ -45,12 +47,14 @@ def write_index(
     spec: Spec,
     plans: Sequence[InstancePlan],
     skipped: Mapping[str, str],
+    *,
+    failed: Iterable[str],
     earlier: Mapping[str, str],
 ) -> None:
     """Write the files about the library as a whole and remove the files of entries that left it.
 
     skipped: names of instances that the specification asks for and that are not in the plans, and why;
-    earlier: checksums of the build before.
+    failed: those of them that an error keeps out; earlier: checksums of the build before.
     """
     sidecars = [
         load_document(folder / f"{entry.name}.json") for planned in plans for entry in planned.entries
@@ -63,8 +67,8 @@ def write_index(
     present |= {name for file in abouts for name in files_of_instance(load_document(folder / file))}
     for sidecar in sidecars:
         present |= {f"{sidecar['name']}.json", *files_of_entry(sidecar)}
-    for name in earlier.keys() - present:  # files that were added by hand stay
-        if _OURS.fullmatch(name) and is_intact(folder, name, earlier):
+    for name in earlier.keys() - present:  # files that were added by hand stay, and those of what failed
+        if _OURS.fullmatch(name) and is_intact(folder, name, earlier) and not name.startswith(tuple(failed)):
             (folder / name).unlink()
     write_checksums(folder, present)
 
@@ -73,7 +77,8 @@ def general_files(
     folder: Path, spec: Spec, sidecars: list[dict[str, Any]], skipped: Mapping[str, str]
 ) -> dict[str, bytes]:
     """Return the files about the library as a whole, the index last. folder: holds all other files."""
-    context = _template_context(spec, sidecars) | {"skipped": skipped}
+    pictures = dict(_draw_pictures(folder, sidecars))
+    context = _template_context(spec, sidecars) | {"skipped": skipped, "pictures": pictures}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
     checkers = {CHECKER: standalone_program(Path(check_point.__file__))}
@@ -83,7 +88,20 @@ def general_files(
             checkers[path.name] = read_bytes(path)
     index = _index_document(spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
     facts = {SOLU: _solu_content(sidecars), TABLE: table(folder, sidecars)}
-    return texts | drawings | checkers | facts | {INDEX: document_bytes(index)}
+    return texts | pictures | drawings | checkers | facts | {INDEX: document_bytes(index)}
+
+
+def _draw_pictures(folder: Path, sidecars: list[dict[str, Any]]) -> Iterator[tuple[str, bytes]]:
+    """Name and content of a picture per sketch: the field of least 2-norm energy on its largest domain."""
+    largest = {
+        sidecar["family"]: sidecar
+        for sidecar in sorted(sidecars, key=lambda each: (each["source"]["size"], each["source"]["gauge"]))
+    }
+    for family in sorted(largest):
+        about = load_document(folder / about_file(instance_name(largest[family])))
+        field = read_field(folder / about["fields"]["least_2"]["file"])
+        suffix = "png" if "faces" in about["instance"] else "svg"
+        yield f"cf_{family}.field.{suffix}", field_picture(field)
 
 
 def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
@@ -104,6 +122,7 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
         "rungs": [rung for rung in rungs if rung["entries"]],
         "instances": len({sidecar["instance"]["sha256"] for sidecar in sidecars}),
         "entries": len(sidecars),
+        "sidecars": sidecars,
         "tokens": {name: FORMULATIONS[name].short for name in spec.formulations},
         "kinds": {sidecar["formulation"]: sidecar for sidecar in reversed(sidecars)},
         "formats": [entry for name, entry in FORMATS.items() if name in written],

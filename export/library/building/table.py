@@ -43,7 +43,8 @@ def _proof_seconds(sidecar: dict[str, Any]) -> float | None:
     return min((value for value in seconds if value is not None), default=None)
 
 
-def _instance_name(sidecar: dict[str, Any]) -> str:
+def instance_name(sidecar: dict[str, Any]) -> str:
+    """Return the name of an entry's instance."""
     return str(sidecar["instance"]["file"]).removesuffix(".instance.json")
 
 
@@ -69,7 +70,7 @@ def _optimum(sidecar: dict[str, Any]) -> float | None:
 
 COLUMNS: Final[Mapping[str, TableColumn]] = {
     "name": TableColumn(str, _fact("name")),
-    "instance": TableColumn(str, _instance_name),
+    "instance": TableColumn(str, instance_name),
     "family": TableColumn(str, _fact("family")),
     "rung": TableColumn(str, _fact("rung")),
     "gauge": TableColumn(str, _fact("source", "gauge")),
@@ -129,7 +130,7 @@ def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:
     writer.writerow(COLUMNS)
     vortices: dict[str, int] = {}
     for sidecar in sidecars:
-        about = load_document(folder / about_file(_instance_name(sidecar)))
+        about = load_document(folder / about_file(instance_name(sidecar)))
         file = about["fields"][role_of(sidecar)]["file"]
         if file not in vortices:
             vortices[file] = len(read_field(folder / file).singularities.index)

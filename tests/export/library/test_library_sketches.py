@@ -1,11 +1,7 @@
-"""Sketches of a library: only strokes are published, and a site accepts plain files alone."""
-
-import shutil
+"""Sketches of a library: only strokes are published."""
 
 import pytest
 from crossfield.export.library.building.verification import verify_library
-from crossfield.export.library.site.site import write_site
-from crossfield.models.errors import InputError
 from crossfield.models.instance.file import read_instance
 from libraries import library_of
 from small_drawings import read
@@ -48,11 +44,6 @@ def built(tmp_path_factory):
     return library_of(folder, SPEC).folder
 
 
-@pytest.fixture
-def lib(built, tmp_path):
-    return shutil.copytree(built, tmp_path / "lib")
-
-
 def test_a_published_sketch_has_its_strokes_and_nothing_else_of_its_file(built):
     assert (built / "cf_evil.sketch.svg").read_text() == SHOWN
     instance = read_instance(built / "cf_evil_n008.instance.json")
@@ -62,12 +53,3 @@ def test_a_published_sketch_has_its_strokes_and_nothing_else_of_its_file(built):
     for path in built.iterdir():
         for word in (b"evil.example", b"alert", b"evil title", b"foreignObject"):
             assert word not in path.read_bytes(), path.name
-
-
-@pytest.mark.parametrize("name", ["cf_evil.sketch.svg", "SHA256SUMS"])
-def test_a_site_refuses_a_link_and_names_it(lib, tmp_path, name):
-    (lib / name).rename(tmp_path / "elsewhere")
-    (lib / name).symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(InputError, match=f"{name}: is a symbolic link, .*put the file in its place"):
-        write_site(lib, tmp_path / "site")
-    assert not (tmp_path / "site").exists()

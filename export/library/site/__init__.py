@@ -1,1 +1,0 @@
-"""A library as static pages."""
