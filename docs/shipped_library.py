@@ -14,11 +14,14 @@ import os
 import subprocess
 import sys
 import tempfile
-from collections import Counter
+from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any, Final
 
 import crossfield as cf
+from crossfield.export.library.ledger.grades import is_proven
+from crossfield.export.library.ledger.ledger import read_ledger
+from crossfield.export.library.plan.recipe import norm_minimised
 from crossfield.export.library.plan.spec import DEFAULT, RUNGS, default_spec
 from machine import processor_name
 from make import markdown, replace_between
@@ -26,13 +29,14 @@ from make import markdown, replace_between
 DOCS: Final = Path(__file__).resolve().parent
 MEASURED: Final = DOCS / "library.json"
 POINTS: Final = DEFAULT.parent / "known" / "points"
-PURPOSES: Final = {
-    "tiny": "all solvers, in seconds; both gauges, both facets",
-    "small": "proofs of optimality",
+CONTENTS: Final = {
+    "tiny": "both gauges, both facets",
+    "small": "every norm with certificates",
     "medium": "`crossfield prove` closes most in minutes",
     "large": "presolve, relaxations, heuristics",
-    "mesh": "orthogonal crosses",
+    "mesh": "orthogonal crosses in the 2-norm",
 }
+STATES: Final = ("optimal", "agreed", "claimed", "open")
 Facts = list[dict[str, Any]]
 
 
@@ -55,8 +59,11 @@ def rungs(entries: Facts) -> str:
         mine = [facts for facts in entries if facts["rung"] == rung]
         instances = {facts["instance"]: facts for facts in mine}.values()
         points = span([facts["pixels"] or facts["faces"] for facts in instances])
-        rows.append([rung, points, str(len(instances)), str(len(mine)), PURPOSES[rung]])
-    heads = ("rung", "pixels or faces", "instances", "entries", "purpose")
+        states = Counter(facts["status"] for facts in mine)
+        easy = sum(facts["difficulty"] == "easy" for facts in mine)
+        counted = [len(instances), len(mine), *(states[state] for state in STATES), easy]
+        rows.append([rung, points, *map(str, counted), CONTENTS[rung]])
+    heads = ("rung", "pixels or faces", "instances", "entries", "proven", *STATES[1:], "easy", "contents")
     return markdown(heads, rows)
 
 
@@ -72,16 +79,40 @@ def minutes() -> str:
 
 
 def counts(entries: Facts) -> str:
-    """Sentences that count entries, instances and certificates."""
+    """Sentences on what the statuses of the entries rest on."""
     instances = len({facts["instance"] for facts in entries})
     status = Counter(facts["status"] for facts in entries)
-    tightened = sum(facts["tightened"] for facts in entries)
+    proven = Counter(facts["solved"] for facts in entries)
     certificates = len(list(POINTS.glob("*.certificate.npz")))
+    tightened = sum(facts["tightened"] for facts in entries)
     return (
-        f"{len(entries)} entries of {instances} instances: {status['optimal']} proven optimal, "
-        f"{status['claimed']} claimed and {status['open']} open; {tightened} "
-        f"[tightened](#tightened-entries). They come with {certificates} certificates."
+        f"{len(entries)} entries of {instances} instances; {tightened} are [tightened](#tightened-entries). "
+        f"Their {status['optimal']} proofs are {certificates} certificates, for {proven['certificate']} "
+        f"entries, and the tangent for {proven['tangent']} QPs with fixed jumps. The others are claims: "
+        f"{status['agreed']} entries on which programs of three makers agree, and {status['claimed']} with "
+        f"fewer. {own_claims(entries)} of these rest on one run of `crossfield prove`, whose certificate is "
+        f"not kept. {status['open']} entries are open."
     )
+
+
+def own_claims(entries: Facts) -> int:
+    """Number of claimed entries whose only claim is a run of crossfield itself."""
+    known = {facts["name"]: facts for facts in entries}
+    programs: dict[Any, set[str]] = defaultdict(set)
+    for record in read_ledger(POINTS.parent).records:
+        facts = known.get(record.entry)
+        if facts is None or record.bound is None:
+            continue
+        if is_proven(facts["objective"], min(record.bound, facts["objective"])):
+            programs[optimum_of(facts)].add(record.solver)
+    claimed = [facts for facts in entries if facts["status"] == "claimed"]
+    return sum(programs[optimum_of(facts)] == {"crossfield"} for facts in claimed)
+
+
+def optimum_of(facts: dict[str, Any]) -> tuple[Any, ...]:
+    """What entries with the same optimum have in common."""
+    norm = norm_minimised(facts["formulation"], facts["facet"])
+    return facts["instance"], norm or (facts["formulation"], facts["facet"])
 
 
 def names() -> str:

@@ -3,12 +3,12 @@
 A solver's tolerances may put its bound a little above the objective of a point that is feasible to 1e-16.
 Within `bound_tolerance` it is cut to that objective; a larger one contradicts the point.
 
-A bound of a program is a claim. It solves an entry if three programs of different makers report it. A
-certificate or the tangent suffices alone.
+A bound of a program is a claim, which nobody can check. If programs of three makers agree on it, it is still
+no proof. A certificate or the tangent is one.
 
 Grades follow MIPLIB:
 
-easy  a run on this entry, on one thread, proved the optimum within EASY seconds; or the tangent proves it
+easy  a run on this entry, on one thread, claims the optimum within EASY seconds; or the tangent proves it
 hard  an optimum is proven or claimed in another way: by a longer run, on several threads, by a certificate,
       or on an equivalent entry
 open  no optimum is proven or claimed
@@ -106,25 +106,18 @@ def entry_status(
         ("tangent", [bound for bound in computed if "certificate" not in bound]),
     ):
         if proofs:
-            return _optimal_status(
-                by, [{key: bound[key] for key in ("solver", "version")} for bound in proofs]
-            )
+            programs = [{key: bound[key] for key in ("solver", "version")} for bound in proofs]
+            return {"status": "optimal", "solved": {"by": by, "programs": programs}}
     claims = [
         record
         for record in records
         if record.bound is not None and is_proven(objective, cut_bound(record.bound, objective))
     ]
-    sound = best_runs((record for record in claims if record.solver in MAKERS), entry)
-    if len({MAKERS[record.solver] for record in sound}) >= AGREE:
-        return _optimal_status("agreement", [_program(record, entry) for record in sound])
-    if claims:
-        programs = [_program(record, entry) for record in best_runs(claims, entry)]
-        return {"status": "claimed", "claimed": programs}
-    return {"status": "best known"}
-
-
-def _optimal_status(by: str, programs: list[dict[str, Any]]) -> dict[str, Any]:
-    return {"status": "optimal", "solved": {"by": by, "programs": programs}}
+    if not claims:
+        return {"status": "best known"}
+    makers = {MAKERS[record.solver] for record in claims if record.solver in MAKERS}
+    programs = [_program(record, entry) for record in best_runs(claims, entry)]
+    return {"status": "agreed" if len(makers) >= AGREE else "claimed", "claimed": programs}
 
 
 def _program(record: Record, entry: str) -> dict[str, Any]:

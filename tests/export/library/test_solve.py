@@ -8,6 +8,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.library_command import solve_command
 from crossfield.export.library.building.build import rebuild
+from crossfield.export.library.building.table import read_table
 from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.contributions.solve import solve_library
 from crossfield.export.library.documents.documents import read_library, read_sidecar
@@ -72,12 +73,14 @@ def test_agreement_needs_three_makers_whatever_the_order():
         records = [Record("cf_a", "0" * 64, solver.title, "1", "optimal", bound=1.0) for solver in chosen]
         different = len({solver.maker for solver in chosen}) == 3
         for ordered in (records, records[::-1]):
-            assert ("solved" in entry_status(1.0, [], ordered, "cf_a")) == different
-        assert "solved" not in entry_status(1.0, [], [replace(records[0], bound=0.9), *records[1:]], "cf_a")
+            status = "agreed" if different else "claimed"
+            assert entry_status(1.0, [], ordered, "cf_a")["status"] == status
+        unequal = [replace(records[0], bound=0.9), *records[1:]]
+        assert entry_status(1.0, [], unequal, "cf_a")["status"] == "claimed"
     assert MAKERS["CPLEX in GAMS"] == MAKERS["CPLEX"]
 
 
-def test_three_known_programs_of_different_makers_solve_an_entry_and_those_like_it(lib):
+def test_programs_of_three_makers_agree_on_an_entry_and_those_like_it_and_prove_nothing(lib):
     for solver in ("A", "B", "C", "CBC", "Bonmin", "HiGHS"):
         add_record(lib, record_of(lib, solver))
     rebuild(lib)
@@ -86,11 +89,15 @@ def test_three_known_programs_of_different_makers_solve_an_entry_and_those_like_
     add_record(lib, record_of(lib, "Gurobi", BILINEAR))
     rebuild(lib)
     sidecar = read_sidecar(lib / f"{MILP}.json")
-    assert (sidecar["status"], sidecar["solved"]["by"]) == ("optimal", "agreement")
-    programs = sidecar["solved"]["programs"]
-    assert [program["solver"] for program in programs] == ["Bonmin", "CBC", "Gurobi", "HiGHS"]
-    assert programs[2]["via"] == BILINEAR
-    assert f"=opt= {BILINEAR} " in (lib / "library.solu").read_text()
+    assert (sidecar["status"], "solved" in sidecar) == ("agreed", False)
+    programs = {program["solver"]: program for program in sidecar["claimed"]}
+    assert set(programs) == {"A", "B", "C", "CBC", "Bonmin", "HiGHS", "Gurobi"}
+    assert programs["Gurobi"]["via"] == BILINEAR
+    solu = (lib / "library.solu").read_text()
+    assert f"=best= {BILINEAR} " in solu
+    assert f"=bestdual= {BILINEAR} " in solu
+    (row,) = [row for row in read_table(lib / "entries.csv") if row["name"] == MILP]
+    assert (row["status"], row["optimum"], row["solved"]) == ("agreed", None, None)
     assert verify_library(lib) == []
 
 
@@ -168,7 +175,7 @@ def test_every_installed_program_solves_its_problems(opened, tmp_path):
         assert record["bound"] is None or record["bound"] <= best + 1e-6
         assert record["machine"] == "a machine"
     if len({SOLVERS[name].maker for name in names}) > 3:
-        assert read_sidecar(lib / f"{MILP}.json")["solved"]["by"] == "agreement"
+        assert read_sidecar(lib / f"{MILP}.json")["status"] == "agreed"
     assert verify_library(lib) == []
     assert solve_library(lib, solvers=names, time_limit=60.0) == []
 
