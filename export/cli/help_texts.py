@@ -69,7 +69,7 @@ PANELS: Final = {
     "Formulation": "formulation facet stroke-norm beta-norm relax limits norm tightened",
     "Method and solver": "method solver start program solve search",
     "Entries": "rung",
-    "Files": "format nl-form gzip manifest solution check on underlay",
+    "Files": "format nl-form gzip manifest solution check on underlay points",
     "Picture and surface": "kind side light flip hint port no-browser",
     "Limits and processes": "time-limit gap threads jobs tolerance up-to scheduler",
     FACTS: "",
@@ -92,8 +92,6 @@ EXAMPLES: Final = {
     "library get": "crossfield library get cf_mouse_n004_exact -o models",
     "library solve": "crossfield library solve library --solver highs --time-limit 2",
     "library verify": "crossfield library verify library",
-    "library submit": "crossfield library submit library proof",
-    "library site": "crossfield library site library -o site",
 }
 """An example of every command; each uses files that earlier examples write."""
 _PANEL_OF: Final = {f"--{name}": panel for panel, names in PANELS.items() for name in names.split()}

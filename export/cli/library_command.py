@@ -1,24 +1,19 @@
-"""The commands of `library`: build, get, solve, verify, submit, site."""
+"""The commands of `library`: build, get, solve, verify."""
 
 from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Final
+from typing import Annotated, Final
 
 import typer
 
 from .help_texts import FACTS, Group
 from .option_groups import command as command_of
 from .options import Folder, PrintOptions, Processes, Seconds
-from .output import print_line, print_notice, show_progress, show_table
+from .output import print_line, print_notice, show_progress
 
-if TYPE_CHECKING:
-    from ..library.contributions.submit import Submission
-
-_SUMMARY: Final = (
-    "Build, check, solve and show a library: instances in every formulation, with best known points."
-)
+_SUMMARY: Final = "Build, check and solve a library: instances in every formulation, with best known points."
 
 library = typer.Typer(
     cls=Group,
@@ -31,7 +26,6 @@ command = partial(command_of, library)
 
 _fact = partial(typer.Option, rich_help_panel=FACTS)
 
-Machine = Annotated[str | None, _fact("--machine", metavar="TEXT", help="Processor and memory.")]
 Library = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield library build` wrote.")]
 
 
@@ -52,6 +46,14 @@ def build_command(
         bool,
         typer.Option("--search", help="Search for points and proofs even where the specification has them."),
     ] = False,
+    points: Annotated[
+        Path | None,
+        typer.Option(
+            "--points",
+            metavar="DIR",
+            help="Folder with points, fields and certificates of others.",
+        ),
+    ] = None,
     printing: PrintOptions,
 ) -> None:
     """Build a library: every instance that the specification asks for, in its formulations and formats.
@@ -59,32 +61,59 @@ def build_command(
     Each entry (an instance in one formulation) has its best known point, and a sidecar: a JSON file with all
     facts about it. Complete files in the folder are kept, so an interrupted build continues.
     A size that is too small for a sketch is skipped with a message. A tightened entry awaits its certificate.
-    library.json lists both.
+    library.json lists both. If an instance or entry fails, the others are built, and the exit code is 1.
+
+    --points checks solution files of {answers}; fields; and certificates of `crossfield prove`. Those that
+    improve an entry are kept. If a file is refused, the exit code is 1.
     """
     from dataclasses import replace
 
     from ..library.building.build import build, records_of_changed_problems
+    from ..library.contributions.points import add_points
+    from ..library.documents.documents import existing_folder
     from ..library.plan.spec import default_spec, read_spec
 
+    checked: dict[Path, list[str]] = {}
+    refused: dict[Path, str] = {}
     with show_progress(quiet=printing.quiet) as show:
         show("reading the specification")
         wanted = default_spec() if spec == "default" else read_spec(spec)
         wanted = replace(wanted, points=None) if search else wanted
+        if points is not None:
+            existing_folder(points)
         built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
+        if points is not None:
+            checked, refused = add_points(built, points, show)
+            if any(checked.values()):
+                built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
     waiting = sum(name.endswith("_tight") for name in built.skipped)
-    too_small = {name: why for name, why in built.skipped.items() if not name.endswith("_tight")}
+    too_small = {
+        name: why
+        for name, why in built.skipped.items()
+        if name not in built.failed and not name.endswith("_tight")
+    }
     line = f"{output}: {len(built.document['entries'])} entries"
+    line += f", {len(built.failed)} instances or entries failed" if built.failed else ""
     line += f", {len(too_small)} instances skipped" if too_small else ""
     line += f"; {waiting} tightened entries await a certificate" if waiting else ""
+    if points is not None:
+        better = sum(map(bool, checked.values()))
+        line += f"; {better} of {len(checked) + len(refused)} points and certificates improve it"
     printing.show(built.document, lambda: print_line(line))
     for name, reason in too_small.items():
         print_notice(f"{name} is skipped: {reason}")
+    for name, reason in built.failed.items():
+        print_notice(f"{name} failed: {reason}")
+    for reason in refused.values():
+        print_notice(reason)
     if stale := sorted({record.entry for record in records_of_changed_problems(built)}):
         print_notice(
             f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have"
             f" changed since: {', '.join(stale[:3])}{', ...' if stale[3:] else ''}; measure them again with"
             " `crossfield library solve`"
         )
+    if built.failed or refused:
+        raise typer.Exit(1)
 
 
 @command("get")
@@ -140,7 +169,7 @@ def solve_command(
         str | None,
         _fact("--by", metavar="TEXT", help="Name of the person who runs them, for the ledger."),
     ] = None,
-    machine: Machine = None,
+    machine: Annotated[str | None, _fact("--machine", metavar="TEXT", help="Processor and memory.")] = None,
     printing: PrintOptions,
 ) -> None:
     """Run the installed solvers on a library and add bounds, times and better points to its ledger.json."""
@@ -185,74 +214,3 @@ def verify_command(
         print_notice(str(defect))
     if defects:
         raise typer.Exit(1)
-
-
-@command("submit")
-def submit_command(
-    folder: Library,
-    files: Annotated[list[Path], typer.Argument(metavar="FILE...", help="Files and folders.")],
-    *,
-    entry: Annotated[
-        str | None,
-        _fact("--entry", metavar="NAME", help="Entry of all files; by default each file shows its own."),
-    ] = None,
-    solver: Annotated[
-        str | None, _fact("--solver", metavar="NAME", help="Solver that found the points.")
-    ] = None,
-    version: Annotated[str | None, _fact("--version", metavar="TEXT", help="Version of the solver.")] = None,
-    machine: Machine = None,
-    by: Annotated[str | None, _fact("--by", metavar="TEXT", help="Name of the submitter.")] = None,
-    date: Annotated[str | None, _fact("--date", metavar="YYYY-MM-DD", help="Day of the run.")] = None,
-    printing: PrintOptions,
-) -> None:
-    """Check files against a library, keep what improves it, and rebuild what depends on them once.
-
-    Accepted are solution files of {answers}; fields; and certificates of `crossfield prove`.
-    Their kind is detected from their content. The exit code is 1 if a file is refused; the others are kept.
-    """
-    from ..library.contributions.submit import RunFacts, submit
-
-    facts = RunFacts(solver, version, machine, by, date)
-    with show_progress(quiet=printing.quiet) as show:
-        results = submit(folder, files, entry=entry, facts=facts, progress=show)
-    columns = ("file", "result", "entry", "now")
-    printing.show(
-        list(map(_submission_document, results)),
-        lambda: show_table(str(folder), columns, list(map(_submission_row, results))),
-    )
-    for result in results:
-        if result.reason:
-            print_notice(result.reason)
-    if any(result.error is not None for result in results):
-        raise typer.Exit(1)
-
-
-def _submission_document(result: Submission) -> dict[str, object]:
-    """A result as JSON."""
-    from dataclasses import asdict
-
-    return asdict(result) | {
-        "file": str(result.file),
-        "error": None if result.error is None else str(result.error),
-    }
-
-
-def _submission_row(result: Submission) -> list[str]:
-    """A row of the table of results, which leaves numbers to JSON so that it fits 80 columns."""
-    more = f" +{len(result.entries) - 1}" if result.entries[1:] else ""
-    return [
-        result.file.name,
-        result.outcome,
-        f"{result.entries[0]}{more}" if result.entries else "",
-        result.status or "",
-    ]
-
-
-@command("site")
-def site_command(folder: Library, output: Folder) -> None:
-    """Write a static site about a library: a table of all entries and a page for each."""
-    from ..library.site.site import write_site
-
-    with show_progress() as show:
-        pages = write_site(folder, output, progress=show)
-    print_line(f"{output}: {len(pages)} pages; open index.html")

@@ -1,6 +1,8 @@
 """Specifications of libraries, and libraries built from them."""
 
-from crossfield.export.library.building.build import build
+from crossfield.export.library.building.build import build, rebuild
+from crossfield.export.library.contributions.points import add_points
+from crossfield.export.library.documents.documents import read_library
 from crossfield.export.library.plan.spec import read_spec
 
 HEAD = 'format = "crossfield-library-spec"\nversion = 1\ntitle = "a library for tests"\n'
@@ -27,6 +29,15 @@ def library_of(folder, text, name="lib"):
     return build(spec_of(folder, text), folder / name)
 
 
+def improve(library, points):
+    """Bring a library up to date with a folder of points; return what they improve, and refusals, by name."""
+    improved, refused = add_points(read_library(library), points)
+    rebuild(library)
+    return {path.name: names for path, names in improved.items()}, {
+        path.name: reason for path, reason in refused.items()
+    }
+
+
 def content(folder):
-    """All files of a folder, hidden ones too, except the lock."""
-    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != ".lock"}
+    """All files of a folder, hidden ones too."""
+    return {path.name: path.read_bytes() for path in folder.iterdir()}

@@ -9,6 +9,8 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterable
 from contextlib import suppress
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -72,13 +74,8 @@ def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -
     """Bring a library up to date with its ledger; only files that the change affects are written again."""
     folder = read_library(folder).folder
     with library_lock(folder, "a build of the library", progress):
-        return rebuild_locked(folder, jobs=jobs, progress=progress)
-
-
-def rebuild_locked(folder: Path, *, jobs: int = 1, progress: Progress = silent) -> Library:
-    """Bring a library up to date as `rebuild` does, under the lock of the caller."""
-    spec, ledger = read_library(folder).spec, read_ledger(folder)
-    return build_locked(spec, folder, ledger, given_points_of(folder), jobs=jobs, progress=progress)
+        spec, ledger = read_library(folder).spec, read_ledger(folder)
+        return build_locked(spec, folder, ledger, given_points_of(folder), jobs=jobs, progress=progress)
 
 
 def build_locked(
@@ -95,8 +92,6 @@ def build_locked(
 
     The ledger is written last, so a refused build has none.
     """
-    for path in folder.glob(".*.part"):  # of a build that was killed
-        path.unlink(missing_ok=True)
     plans = plan_library(spec)
     entries = [entry.name for planned in plans for entry in planned.entries]
     ledger = merge_ledgers(folder, ledger, entries, [planned.recipe.name for planned in plans])
@@ -106,13 +101,15 @@ def build_locked(
             work.begin(planned)  # the last task runs first: small ones, whose faults show at once
         tasks.run()
     complete = without_skipped(plans, work.skipped)
-    if not complete:
+    if not any(planned.entries for planned in complete):
         name, reason = next(iter(work.skipped.items()))
-        raise InputError(f"every grid is too coarse for its sketch; {name}: {reason}")
+        raise InputError(f"none of its instances can be made; {name}: {reason}")
     write_ledger(ledger)
     progress("index and checksums")
-    write_index(folder, spec, complete, dict(sorted(work.skipped.items())), work.sums)
-    return read_library(folder)
+    write_index(
+        folder, spec, complete, dict(sorted(work.skipped.items())), failed=work.failed, earlier=work.sums
+    )
+    return replace(read_library(folder), failed=work.failed)
 
 
 def has_unbuilt_records(library: Library) -> bool:
@@ -139,28 +136,39 @@ def _known_checksums(folder: Path) -> dict[str, str]:
     return {}
 
 
+def _attempt(make: Callable[[Any], Files], task: Any) -> Files | CrossfieldError:
+    """Return the files of a task, or its error, which does not end the build."""
+    try:
+        return make(task)
+    except CrossfieldError as error:
+        return error
+
+
 class _Build:
     """A build in progress: its tasks and the number of finished entries."""
 
     def __init__(self, folder: Path, inputs: BuildInputs, tasks: Tasks, progress: Progress) -> None:
         self.folder, self.inputs, self.tasks, self.progress = folder, inputs, tasks, progress
         self.total, self.done = sum(len(planned.entries) for planned in self.inputs.plans), 0
-        self.skipped: dict[str, str] = {}  # instances and entries that cannot be made, and the reasons
+        self.skipped: dict[str, str] = {}  # instances and entries that are not made, and the reasons
+        self.failed: dict[str, str] = {}  # those of them that are not too small and await no certificate
         self.sums = _known_checksums(folder)
 
     def begin(self, planned: InstancePlan) -> None:
         """Schedule an instance unless it is complete, and then its entries."""
-        task = self.inputs.instance_task(planned)
+        try:
+            task = self.inputs.instance_task(planned)
+        except CrossfieldError as error:
+            self._omit(planned.recipe.name, error, len(planned.entries))
+            return
         about = self._complete_document(about_file(task.name), task.sha256, read_about, files_of_instance)
         if about is not None:
             self._schedule_entries(planned, about)
             return
 
-        def finish(files: Files | NoStrokeError) -> None:
-            if isinstance(files, NoStrokeError):
-                self.total -= len(planned.entries)
-                self.skipped[task.name] = str(files).removeprefix(f"{task.name}: ")
-                self.progress(f"skipped: {files}")
+        def finish(files: Files | CrossfieldError) -> None:
+            if isinstance(files, CrossfieldError):
+                self._omit(task.name, files, len(planned.entries))
                 return
             self._write(files)
             about = json.loads(files[about_file(task.name)])
@@ -169,7 +177,7 @@ class _Build:
             self._schedule_entries(planned, about)
 
         self.progress(f"points and bounds of {task.name}")
-        self.tasks.add(make_instance_files, task, finish)
+        self.tasks.add(partial(_attempt, make_instance_files), task, finish)
 
     def _complete_document(
         self,
@@ -199,10 +207,21 @@ class _Build:
             if self._complete_document(f"{task.name}.json", task.sha256, read_sidecar, files_of_entry):
                 self.done += 1
             else:
-                self.tasks.add(make_entry, task, self._finish(task.name))
+                self.tasks.add(partial(_attempt, make_entry), task, self._finish(task.name))
 
-    def _finish(self, name: str) -> Callable[[Files], None]:
-        def finish(files: Files) -> None:
+    def _omit(self, name: str, error: CrossfieldError, entries: int) -> None:
+        """Keep an instance or entry out of the library, and the reason."""
+        self.total -= entries
+        self.skipped[name] = str(error).removeprefix(f"{name}: ")
+        if not isinstance(error, NoStrokeError):
+            self.failed[name] = self.skipped[name]
+        self.progress(f"omitted: {name}: {self.skipped[name]}")
+
+    def _finish(self, name: str) -> Callable[[Files | CrossfieldError], None]:
+        def finish(files: Files | CrossfieldError) -> None:
+            if isinstance(files, CrossfieldError):
+                self._omit(name, files, 1)
+                return
             self._write(files)
             self.done += 1
             self.progress(f"{self.done} of {self.total} entries: {name}")

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any, Final
 
-from ....models.errors import NoStrokeError
 from ....models.field.field import CrossField
 from ....models.field.file import field_to_json
 from ....models.instance.file import instance_to_json
@@ -30,15 +29,12 @@ SUFFIXES: Final = {
 _SIDES: Final = ("height", "width", "vertices", "euler_characteristic")  # of a grid; of a mesh
 
 
-def make_instance_files(task: InstanceTask) -> Files | NoStrokeError:
-    """Make the files of an instance; return their contents by name, or the error that its size is too small.
+def make_instance_files(task: InstanceTask) -> Files:
+    """Make the files of an instance; return their contents by name, the document last.
 
-    The document is last.
+    Raises NoStrokeError if its size is too small.
     """
-    try:
-        instance = make_instance(task.recipe)
-    except NoStrokeError as error:
-        return error
+    instance = make_instance(task.recipe)
     points = task.given if task.given and task.given.instance == instance.sha256 else None
     sent = [
         check_certificate(proof.data, proof.file, instance, proof.provenance)

@@ -23,7 +23,7 @@ from ...formats.registry import program_version
 from ..documents.check_point import BadInputError, check
 from ..documents.checksums import SUMS, is_intact, read_checksums
 from ..documents.documents import INDEX, Library, existing_folder, read_library
-from ..documents.lock import LOCK, library_lock_if_writable
+from ..documents.lock import library_lock
 from ..ledger.grades import FEASIBLE
 from ..ledger.known_points import all_points_of
 from ..ledger.ledger import LEDGER, read_ledger
@@ -32,7 +32,7 @@ from .executor import open_tasks
 
 BUILD: Final = "build the library again"
 _FETCH: Final = f"fetch it again, or {BUILD}"
-_INTERRUPTED: Final = f"after an interrupted solve or submission {BUILD}; otherwise fetch it again"
+_INTERRUPTED: Final = f"after an interrupted solve {BUILD}; otherwise fetch it again"
 _REMOVE: Final = "remove it"
 
 
@@ -57,14 +57,14 @@ class Defect:
 
 
 def verify_library(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -> list[Defect]:
-    """Return the defects of a library in a folder, which is locked during the work.
+    """Return the defects of a library in a folder, which no build changes during the work.
 
-    Raises InputError without a library, OutputError if another process holds the lock for too long.
+    Raises InputError without a library.
     """
     folder = existing_folder(folder)
     if not (folder / INDEX).is_file() and not (folder / SUMS).is_file():
         raise InputError("is no library: it has neither library.json nor SHA256SUMS", file=folder)
-    with library_lock_if_writable(folder, "a verification of the library", progress):
+    with library_lock(folder, "a verification of the library", progress):
         progress("files and checksums")
         defects = [*_find_misplaced_files(folder), *_find_damaged_files(folder)]
         named = {defect.file for defect in defects}
@@ -76,7 +76,7 @@ def _file_names(folder: Path) -> set[str]:
     return {
         path.name
         for path in folder.iterdir()
-        if path.is_file() and not path.is_symlink() and path.name != LOCK and path.suffix != ".part"
+        if path.is_file() and not path.is_symlink() and path.suffix != ".part"
     }
 
 
@@ -130,6 +130,7 @@ def _find_differences(
             again = Path(temporary)
             ledger, points = read_ledger(folder), all_points_of(library)
             rebuilt = build_locked(library.spec, again, ledger, points, jobs=jobs, progress=progress)
+            yield from (Defect(name, why) for name, why in rebuilt.failed.items())
             present, built = _file_names(folder), _file_names(again)
             remedy = BUILD if has_unbuilt_records(library) else f"{_REMOVE}, and {BUILD}"
             for name in (present | built) - {SUMS, *named}:

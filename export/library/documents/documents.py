@@ -6,7 +6,8 @@ Their schemas are the files library-*.schema.json in this folder.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
@@ -30,10 +31,14 @@ INDEX: Final = "library.json"
 
 @dataclass(frozen=True, eq=False)
 class Library:
-    """A built library: its folder and its checked index."""
+    """A built library: its folder and its checked index.
+
+    failed: names of instances and entries that its build could not make, and why.
+    """
 
     folder: Path
     document: dict[str, Any]
+    failed: Mapping[str, str] = field(default_factory=dict)
 
     @cached_property
     def entries(self) -> tuple[dict[str, Any], ...]:
@@ -50,7 +55,7 @@ class Library:
 
     @property
     def skipped(self) -> dict[str, str]:
-        """Names of instances too small for their sketch and of entries without certificate, and why."""
+        """Names of instances and entries that the specification asks for and the library lacks, and why."""
         return dict(self.document.get("skipped", {}))
 
     @property

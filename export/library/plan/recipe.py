@@ -79,7 +79,7 @@ class EntryRecipe:
         if not self.tightened or str(self.norm) in about.get("certificates", {}):
             return ""
         named = f"the norm {self.norm}" if self.norm == "mixed" else f"the {self.norm}-norm"
-        return f"{self.instance} has no certificate in {named}; submit one of `crossfield prove`"
+        return f"{self.instance} has no certificate in {named}; give one of `crossfield prove` with --points"
 
 
 @dataclass(frozen=True)

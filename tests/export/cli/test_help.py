@@ -31,7 +31,7 @@ NAMED = {
     "shade": [SAMPLES],
     "verify": [PROGRAMS],
     "library solve": [SOLVERS, RUNGS],
-    "library submit": [],
+    "library build": [],
 }
 """Tables whose names the help of a command lists."""
 OTHERS = (
@@ -39,9 +39,7 @@ OTHERS = (
     "studio",
     "list",
     "library",
-    "library build",
     "library verify",
-    "library site",
 )
 
 

@@ -22,6 +22,7 @@ from children import command_lines, complaints, descendants
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.building.fields import improve_in_1norm
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.documents.documents import problem_of, read_library
 from crossfield.export.library.documents.statistics import tangent_bound
 from crossfield.export.library.plan.instances import make_instance
@@ -36,7 +37,7 @@ from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.publication import svg_of_curves
 from crossfield.models.sketch.samples import sample, sample_svg
 from crossfield.models.sketch.svg import read_svg
-from libraries import HEAD, content
+from libraries import HEAD, content, spec_of
 from loops import for_each
 
 SCHEMAS = places.ROOT / "export" / "library" / "documents"
@@ -386,7 +387,8 @@ def test_only_missing_or_damaged_files_are_made_again(built, spec, copy):
     (copy / "cf_own_n004_milp.json").unlink()
     (copy / "cf_rand_n006_s2_qp.nl.gz").write_bytes(b"half")
     (copy / "cf_own_n004_box_parity.json").write_text("{}")
-    (copy / ".cf_own_n004_qp.json.abc.part").write_bytes(b"half")
+    download = copy / ".cf_own_n004_qp.json.abc.part"  # of a browser
+    download.write_bytes(b"half")
     messages = []
     build(read_spec(spec), copy, progress=messages.append)
     assert sorted(line.split(": ")[1] for line in messages[:-1]) == [
@@ -394,7 +396,60 @@ def test_only_missing_or_damaged_files_are_made_again(built, spec, copy):
         "cf_own_n004_milp",
         "cf_rand_n006_s2_qp",
     ]
-    assert content(copy) == content(built.folder)
+    assert content(copy) == {**content(built.folder), download.name: b"half"}
+
+
+def test_an_instance_that_fails_is_reported_and_the_others_are_built(tmp_path, capsys):
+    """A drawing without strokes next to a random sketch, in a new folder and again."""
+    (tmp_path / "bare.scap").write_text("#9 9\n")
+    spec = """formulations = ["qp"]
+[rungs.tiny]
+sizes = [4]
+formats = ["mps"]
+[[sketches]]
+name = "bare"
+file = "bare.scap"
+points = "greedy"
+[[sketches]]
+name = "rand"
+random = "full"
+seeds = [1]
+points = "greedy"
+"""
+    spec_of(tmp_path, spec)
+    command = ["library", "build", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "lib"), "--quiet"]
+    for _ in range(2):
+        assert invoke(command) == 1
+        assert "cf_bare_n004 failed: " in capsys.readouterr().err
+    library = read_library(tmp_path / "lib")
+    assert library.document["entries"] == ["cf_rand_n004_s1_qp"]
+    assert "holds no stroke" in library.skipped["cf_bare_n004"]
+    assert "cf_bare_n004: " in (tmp_path / "lib" / "README.md").read_text()
+    assert [defect.file for defect in verify_library(tmp_path / "lib")] == ["cf_bare_n004"]
+
+
+def test_a_build_that_is_refused_leaves_nothing(tmp_path):
+    (tmp_path / "bare.scap").write_text("#9 9\n")
+    bare = '[[sketches]]\nname = "bare"\nfile = "bare.scap"\n'
+    spec = spec_of(tmp_path, f'formulations = ["qp"]\n[rungs.tiny]\nsizes = [4]\n{bare}')
+    for folder in ("new", "old"):
+        with pytest.raises(InputError, match="holds no stroke"):
+            build(spec, tmp_path / folder)
+        assert not (tmp_path / folder).exists() or list((tmp_path / folder).iterdir()) == []
+        (tmp_path / "old").mkdir(exist_ok=True)
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.slow
+def test_two_builds_in_one_folder_come_one_after_the_other(built, spec, tmp_path):
+    """Each ends with the library of a single one, and neither writes a lock."""
+    out = tmp_path / "out"
+    out.mkdir()
+    both = [subprocess.Popen(build_command(spec, out, "1"), stderr=subprocess.PIPE, text=True) for _ in "ab"]
+    said = [process.communicate()[1] for process in both]
+    assert [process.returncode for process in both] == [0, 0]
+    assert any("waits for another process, which is at work on" in text for text in said)
+    assert content(out) == content(built.folder)
 
 
 @pytest.mark.slow

@@ -17,9 +17,8 @@ from crossfield.export.library.plan.instances import make_instance
 from crossfield.export.library.plan.recipe import NORMS, plan_library
 from crossfield.export.library.plan.spec import default_spec, read_spec
 from crossfield.models.errors import CrossfieldError, InputError
-from libraries import content, library_of, spec_of
+from libraries import content, improve, library_of, spec_of
 from processors import PROCESSORS
-from submitting import submit_one
 
 pytestmark = pytest.mark.usefixtures("short_searches")
 
@@ -138,13 +137,16 @@ def test_a_build_with_points_searches_for_nothing(searched, tmp_path):
 
 
 @pytest.mark.slow
-def test_a_submission_keeps_given_points_and_another_build_gives_the_same(searched, tmp_path):
+def test_a_better_point_keeps_given_points_and_another_build_gives_the_same(searched, tmp_path):
     """A library of poor points accepts a better one, which a new build from the ledger reproduces."""
     known = shutil.copytree(searched, tmp_path / "known")
     worsened(known / f"{SADDLE}.about.json")
     spec = spec_of(tmp_path, 'points = "known"\n' + SPEC)
     library = build(spec, tmp_path / "lib").folder
-    assert submit_one(library, searched / f"{SADDLE}_exact.sol").better_point
+    (tmp_path / "sent").mkdir()
+    shutil.copy(searched / f"{SADDLE}_exact.sol", tmp_path / "sent")
+    improved, _ = improve(library, tmp_path / "sent")
+    assert f"{SADDLE}_exact" in improved[f"{SADDLE}_exact.sol"]
     assert verify_library(library) == []
     other = tmp_path / "other"
     other.mkdir()

@@ -9,10 +9,9 @@ from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.building.table import read_table
 from crossfield.export.library.building.verification import verify_library
-from crossfield.export.library.contributions.submit import submit
 from crossfield.export.library.documents.documents import problem_of
 from crossfield.models.errors import InputError
-from libraries import library_of, spec_of
+from libraries import improve, library_of, spec_of
 
 SPEC = """formulations = ["milp", "exact", "qp"]
 
@@ -32,7 +31,7 @@ STEM = "cf_rand_n003_s1"
 CERTIFICATES = {"exact": f"{STEM}.certificate.npz", "milp": f"{STEM}.l1.certificate.npz"}
 
 
-REMEDY = "submit one of `crossfield prove`"
+REMEDY = "give one of `crossfield prove` with --points"
 ORDER = (("", ("milp", "exact")), ("_tight", ("exact", "milp")))
 
 
@@ -100,8 +99,9 @@ def test_an_entry_without_a_certificate_is_skipped_with_its_reason(tmp_path):
     assert f"{STEM}_exact_tight: {STEM} has no certificate" in (library.folder / "README.md").read_text()
     assert verify_library(library.folder) == []
     proof = cf.prove(cf.read_instance(library.folder / f"{STEM}.instance.json"), jobs=1)
-    cf.write_certificate(proof, tmp_path / "it.npz")
-    assert [result.outcome for result in submit(library.folder, [tmp_path / "it.npz"])] == ["accepted"]
+    (tmp_path / "sent").mkdir()
+    cf.write_certificate(proof, tmp_path / "sent" / "it.npz")
+    assert improve(library.folder, tmp_path / "sent") == ({"it.npz": [f"{STEM}_exact"]}, {})
     assert f"{STEM}_exact_tight" in json.loads((library.folder / "library.json").read_text())["entries"]
     assert verify_library(library.folder) == []
 
@@ -115,10 +115,10 @@ def test_a_build_counts_the_entries_that_await_a_certificate_and_warns_of_none(t
 
 
 def test_a_field_outside_the_windows_is_not_better_and_not_refused(lib, tmp_path):
-    path = tmp_path / "worse.npz"
+    (tmp_path / "sent").mkdir()
     field = cf.power_field(cf.read_instance(lib / f"{STEM}.instance.json"))
-    cf.write_field(field, path)
-    assert [result.outcome for result in submit(lib, [path])] == ["not better"]
+    cf.write_field(field, tmp_path / "sent" / "worse.npz")
+    assert improve(lib, tmp_path / "sent") == ({"worse.npz": []}, {})
 
 
 @pytest.mark.parametrize(
