@@ -188,7 +188,7 @@ def field_to_json(field: CrossField) -> bytes:
 def _rows_of_pixels(field: CrossField) -> dict[str, tuple[np.ndarray[Any, Any], ...]]:
     """Columns of the rows of a field on pixels."""
     grid = field.instance.grid
-    upper, right = (_jump_column(field, table) for table in grid.pair_number)
+    upper, right = (_jump_column(field, pair) for pair in grid.pair_number)
     return {"pixels": (grid.rows, grid.columns, field.alpha, field.beta, upper, right)}
 
 
@@ -198,9 +198,8 @@ def _rows_of_faces(field: CrossField) -> dict[str, tuple[np.ndarray[Any, Any], .
     return {"faces": (field.alpha, field.beta), "jumps": (mesh.first, mesh.second, field.p)}
 
 
-def _jump_column(field: CrossField, table: Ints) -> np.ndarray[Any, Any]:
-    """Jump of each pixel's pair in the table, None without a pair; shape (n,), objects."""
-    pair = table[field.instance.mask]
+def _jump_column(field: CrossField, pair: Ints) -> np.ndarray[Any, Any]:
+    """Jump of each pixel's pair, None without one; shape (n,), objects."""
     jumps = np.full(len(pair), None, dtype=object)
     jumps[pair >= 0] = field.p[pair[pair >= 0]]
     return jumps
@@ -220,8 +219,8 @@ def field_of_json(data: bytes) -> CrossField:
         _check_places(instance.grid, np.array([row, column], dtype=np.int32))
         p = np.zeros(len(instance.grid.first), dtype=np.int32)
         tables = zip(("upper", "right"), instance.grid.pair_number, (upper, right), strict=True)
-        for name, table, jumps in tables:
-            _fill_jumps(instance.grid, p, table, np.array(jumps, dtype=np.float64), name)
+        for name, pair, jumps in tables:
+            _fill_jumps(p, pair, np.array(jumps, dtype=np.float64), name)
         return _make_field(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
@@ -285,9 +284,8 @@ def _check_places(grid: Grid, places: Ints) -> None:
         )
 
 
-def _fill_jumps(grid: Grid, p: Ints, table: Ints, jumps: Floats, name: str) -> None:
+def _fill_jumps(p: Ints, pair: Ints, jumps: Floats, name: str) -> None:
     """Store the jumps of the pixels, NaN where there is none, at their pairs in p."""
-    pair = table[grid.mask]
     wrong: Bools = np.isnan(jumps) != (pair < 0)
     if wrong.any():
         raise InstanceError(

@@ -98,14 +98,19 @@ class Grid(Domain):
         return int(self.mask.shape[1])
 
     @cached_property
+    def _places(self) -> tuple[Ints, Ints]:
+        row, column = np.nonzero(self.mask)
+        return row.astype(np.int32), column.astype(np.int32)
+
+    @property
     def rows(self) -> Ints:
         """Row of each pixel, shape (n,)."""
-        return np.nonzero(self.mask)[0].astype(np.int32)
+        return self._places[0]
 
-    @cached_property
+    @property
     def columns(self) -> Ints:
         """Column of each pixel, shape (n,)."""
-        return np.nonzero(self.mask)[1].astype(np.int32)
+        return self._places[1]
 
     @property
     def size(self) -> int:
@@ -119,13 +124,22 @@ class Grid(Domain):
         number[self.mask] = np.arange(self.size, dtype=np.int32)
         return number
 
+    def numbers_at(self, rows: Ints, columns: Ints) -> Ints:
+        """Number of the pixel at each place, -1 outside the mask; in `number`, large grids need gigabytes."""
+        key = rows.astype(np.int64) * self.width + columns
+        at = np.minimum(np.searchsorted(self._keys, key), self.size - 1)
+        inside = (columns >= 0) & (columns < self.width) & (self._keys[at] == key)
+        return np.where(inside, at, -1).astype(np.int32)
+
+    @cached_property
+    def _keys(self) -> NDArray[np.int64]:
+        return self.rows.astype(np.int64) * self.width + self.columns
+
     @cached_property
     def _pairs(self) -> tuple[Ints, Ints, Bools]:
-        upper = np.full(self.mask.shape, -1, dtype=np.int32)
-        upper[1:] = self.number[:-1]
-        right = np.full(self.mask.shape, -1, dtype=np.int32)
-        right[:, :-1] = self.number[:, 1:]
-        neighbour = np.stack([upper[self.mask], right[self.mask]], axis=1)
+        upper = self.numbers_at(self.rows - 1, self.columns)
+        right = self.numbers_at(self.rows, self.columns + 1)
+        neighbour = np.stack([upper, right], axis=1)
         first, side = np.nonzero(neighbour >= 0)
         return first.astype(np.int32), neighbour[first, side], side == 0
 
@@ -146,13 +160,11 @@ class Grid(Domain):
 
     @cached_property
     def pair_number(self) -> tuple[Ints, Ints]:
-        """Numbers of each pixel's pairs with the upper and right neighbours, [height, width] each, or -1."""
-        upper = np.full(self.mask.shape, -1, dtype=np.int32)
-        right = upper.copy()
+        """Number of each pixel's pair with its upper and with its right neighbour, (n,) each, -1 for none."""
+        upper, right = np.full((2, self.size), -1, dtype=np.int32)
         index = np.arange(len(self.first), dtype=np.int32)
         for table, chosen in ((upper, self.upward), (right, ~self.upward)):
-            pixel = self.first[chosen]
-            table[self.rows[pixel], self.columns[pixel]] = index[chosen]
+            table[self.first[chosen]] = index[chosen]
         return upper, right
 
     @cached_property
@@ -163,8 +175,9 @@ class Grid(Domain):
         left side (stored upwards, walked in reverse).
         """
         upper, right = self.pair_number
-        bottom, side = right[1:, :-1], upper[1:, 1:]
-        top, left = right[:-1, :-1], upper[1:, :-1]
+        corner = np.nonzero((upper >= 0) & (right >= 0))[0]
+        bottom, left = right[corner], upper[corner]
+        side, top = upper[self.second[bottom]], right[self.second[left]]
         walk = np.stack([bottom, side, top, left], axis=-1)
         return walk[(walk >= 0).all(axis=-1)]
 

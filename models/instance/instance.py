@@ -492,15 +492,13 @@ def _numbers_of_pixels(grid: Grid, pixels: Ints) -> Ints:
         raise InstanceError(
             f"stroke_pixels has shape {pixels.shape}; give [row, column] for each stroke pixel"
         )
-    row, column = pixels.T
-    on_grid = (row >= 0) & (column >= 0) & (row < grid.height) & (column < grid.width)
-    number = np.where(on_grid, grid.number[np.where(on_grid, row, 0), np.where(on_grid, column, 0)], -1)
+    number = grid.numbers_at(*pixels.T)
     if (number < 0).any():
         row, column = pixels[int(np.argmax(number < 0))]
         raise InstanceError(
             f"stroke pixel [{row}, {column}]: is outside the mask ({int((number < 0).sum())} in all)"
         )
-    return number.astype(np.int32)
+    return number
 
 
 def _read_only(array: np.ndarray[Any, Any]) -> Any:

@@ -107,7 +107,8 @@ def state_on(lattice: Lattice, shares: tuple[Floats, Floats], clusters: Clusters
 
 def _around(grid: Grid) -> Indices:
     """The pairs of each pixel with its upper, left, lower and right neighbour, -1 for none; shape (n, 4)."""
-    upper, right = (np.pad(table, 1, constant_values=-1) for table in grid.pair_number)
-    row, column = grid.rows + 1, grid.columns + 1
-    pairs = (upper[row, column], right[row, column - 1], upper[row + 1, column], right[row, column])
-    return np.stack(pairs, axis=1).astype(np.int64)
+    pairs = np.full((grid.size, 4), -1, dtype=np.int64)
+    upwards, to_right = np.nonzero(grid.upward)[0], np.nonzero(~grid.upward)[0]
+    pairs[grid.first[upwards], 0], pairs[grid.second[to_right], 1] = upwards, to_right
+    pairs[grid.second[upwards], 2], pairs[grid.first[to_right], 3] = upwards, to_right
+    return pairs

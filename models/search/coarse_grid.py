@@ -50,7 +50,7 @@ def halve_resolution(instance: Instance) -> Instance | None:
 def copy_to_fine_grid(coarse: CrossField, instance: Instance) -> FreeField:
     """The coarse crosses and jumps on the fine grid; strokes have the label whose u is nearest to them."""
     grid = instance.grid
-    parent = coarse.instance.grid.number[grid.rows // 2, grid.columns // 2]
+    parent = coarse.instance.grid.numbers_at(grid.rows // 2, grid.columns // 2)
     alpha, beta, at = coarse.alpha[parent], coarse.beta[parent], instance.stroke_index
     steps = np.zeros(grid.size, dtype=np.int32)
     steps[at] = _nearest_label(instance.target, alpha[at], beta[at])
@@ -64,8 +64,7 @@ def _jumps_between_parents(coarse: CrossField, parent: Ints, instance: Instance)
     grid, above = instance.grid, coarse.instance.grid
     first, second = parent[grid.first], parent[grid.second]
     upper, right = above.pair_number
-    row, column = above.rows[first], above.columns[first]
-    pair = np.where(grid.upward, upper[row, column], right[row, column])
+    pair = np.where(grid.upward, upper[first], right[first])
     return np.where(first == second, 0, coarse.p[pair]).astype(np.int32)
 
 

@@ -31,13 +31,13 @@ def nearest_strokes(instance: Instance) -> Ints:
 
 def chamfer_distances(grid: Grid) -> Any:
     """Distances between neighbours: 3 along the grid, 4 across a corner next to a pixel of the mask."""
-    number = grid.number
-    squares = [(number[1:, :-1], number[:-1, 1:], number[:-1, :-1], number[1:, 1:])]
-    squares.append((squares[0][2], squares[0][3], squares[0][0], squares[0][1]))
     first, second = [grid.first], [grid.second]
-    for start, end, one, another in squares:
-        passable = (start >= 0) & (end >= 0) & ((one >= 0) | (another >= 0))
-        first.append(start[passable])
+    for down in (-1, 1):
+        end = grid.numbers_at(grid.rows + down, grid.columns + 1)
+        one = grid.numbers_at(grid.rows + down, grid.columns)
+        another = grid.numbers_at(grid.rows, grid.columns + 1)
+        passable = (end >= 0) & ((one >= 0) | (another >= 0))
+        first.append(np.nonzero(passable)[0].astype(np.int32))
         second.append(end[passable])
     length = np.full(sum(map(len, first)), 4.0)
     length[: len(grid.first)] = 3.0

@@ -27,6 +27,15 @@ def interrupted(program: str, folder: Path | None = None) -> list[str]:
     return out.splitlines()[-1].split()
 
 
+def within_memory(program: str, folder: Path, gigabytes: float = 2.0) -> str:
+    """What a Python program prints in a process of its own with so much address space; it must end well."""
+    limit = f"import resource\nresource.setrlimit(resource.RLIMIT_AS, 2 * [{int(gigabytes * 2**30)}])\n"
+    command = [sys.executable, "-c", limit + program]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def complaints(err: str) -> str:
     """Standard error without the lines that say, every few seconds, what is being done."""
     return re.sub(r"^\[\d+ s\] .*\n", "", err, flags=re.MULTILINE)

@@ -23,8 +23,8 @@ def test_a_grid_of_two_by_two_is_numbered_as_by_hand():
     # 0 -> 1 to the right; 2 -> 0 up, 2 -> 3 to the right; 3 -> 1 up.
     assert pairs(grid) == [(0, 1, False), (2, 0, True), (2, 3, False), (3, 1, True)]
     upper, right = grid.pair_number
-    assert upper.tolist() == [[-1, -1], [1, 3]]
-    assert right.tolist() == [[0, -1], [2, -1]]
+    assert upper.tolist() == [-1, -1, 1, 3]
+    assert right.tolist() == [0, -1, 2, -1]
     # Bottom 2 -> 3, right side 3 -> 1, top 0 -> 1, left side 2 -> 0.
     assert grid.quads.tolist() == [[2, 3, 0, 1]]
 
@@ -62,8 +62,8 @@ def test_walk_round_a_block_is_closed_and_counter_clockwise(mask):
 def test_pair_numbers_lead_back_to_the_pairs(mask):
     grid = Grid(mask)
     for table, upward in zip(grid.pair_number, (True, False), strict=True):
-        row, column = np.nonzero(table >= 0)
-        pair = table[row, column]
-        assert (grid.first[pair] == grid.number[row, column]).all()
+        (pixel,) = np.nonzero(table >= 0)
+        pair = table[pixel]
+        assert (grid.first[pair] == pixel).all()
         assert (grid.upward[pair] == upward).all()
     assert sum((table >= 0).sum() for table in grid.pair_number) == len(grid.first)
