@@ -349,6 +349,11 @@ def write_editions() -> None:
     replace_between(DOCS / "guides" / "solvers.md", "editions", table)
 
 
+def write_claims() -> None:
+    """Write docs/files/claims.csv: the table of statuses, which code reads from the package."""
+    shutil.copyfile(DOCS.parent / "export" / "statuses.csv", DOCS / "files" / "claims.csv")
+
+
 def draw_figures() -> None:
     """Draw docs/pictures/first_*.svg and math_*.svg: docs/cross-field.md and docs/mathematics.md."""
     import diagrams
@@ -393,6 +398,7 @@ PAGES: dict[str, Callable[[], None]] = {
     "traps": write_traps,
     "architecture": write_architecture,
     "editions": write_editions,
+    "claims": write_claims,
 }
 
 

@@ -225,6 +225,8 @@ def read_command(
     *,
     tolerance: options.Tolerance = 1e-5,
     pick: options.Pick = None,
+    gap: options.AnswerGap = None,
+    bound: options.AnswerBound = None,
     printing: options.PrintOptions,
 ) -> None:
     """Read a solver's solution file back as a cross field, and check it.
@@ -240,9 +242,17 @@ def read_command(
     with show_progress(quiet=printing.quiet) as show:
         show("reading the solution")
         problem, held = read_described_problem(manifest)
-        answer = read_solution(solution, problem, held=held, tolerance=tolerance, solution=pick)
+        answer = read_solution(
+            solution,
+            problem,
+            held=held,
+            tolerance=tolerance,
+            solution=pick,
+            stated_gap=gap,
+            stated_bound=bound,
+        )
         if answer.point is None:
-            words = answer.caveat and f"; claims {answer.caveat}"
+            words = (answer.caveat and f"; claims {answer.caveat}") or (answer.doubt and f"; {answer.doubt}")
             raise InputError(
                 f"holds no point: {answer.status}; {answer.message or 'the solver gives no reason'}{words}",
                 file=solution,

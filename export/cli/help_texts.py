@@ -71,7 +71,7 @@ PANELS: Final = {
     "Entries": "rung",
     "Files": "format nl-form gzip manifest solution check on underlay points",
     "Picture and surface": "kind side light flip hint port no-browser",
-    "Limits and processes": "time-limit gap threads jobs tolerance up-to scheduler",
+    "Limits and processes": "time-limit gap bound threads jobs tolerance up-to scheduler",
     FACTS: "",
     "Output": "output quiet json help",
 }

@@ -245,6 +245,22 @@ Pick = Annotated[
         " the first.",
     ),
 ]
+AnswerGap = Annotated[
+    float | None,
+    _gap(
+        help="Relative gap that the program was given, for a file that calls its point optimal and states no"
+        " dual bound; 0 for an exact search.",
+    ),
+]
+AnswerBound = Annotated[
+    float | None,
+    typer.Option(
+        "--bound",
+        metavar="X",
+        help="Dual bound that the program has proven, from its log; the greater one of this and the file's"
+        " counts.",
+    ),
+]
 SolveSeconds = Annotated[
     float | None,
     typer.Option(

@@ -14,7 +14,7 @@ import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
 from ...models.processes.child_program import on_stop
-from ..statuses import CPLEX, CPLEX_STOPPED, Status
+from ..statuses import claim_of
 from ..writing.terms import Terms, terms_of_entries
 from .model_content import Algebra, finite_or_none, with_infinities
 from .protocol import Job, Outcome, RefusedError, TooLargeError, write_in_full
@@ -117,8 +117,7 @@ def solve(job: Job) -> Outcome:
     nodes = answer.progress.get_num_nodes_processed() if mixed else None
     bound = finite_or_none(answer.MIP.get_best_objective()) if mixed else None
     if not answer.is_primal_feasible():
-        code = answer.get_status()
-        status = Status.LIMIT_WITHOUT_POINT if code in CPLEX_STOPPED else CPLEX.get(code, Status.ERROR)
+        status, _ = claim_of(answer.get_status(), "cplex")
         return Outcome(status.without_point, words, bound, nodes)
     with write_in_full(job.solution) as part:
         answer.write(str(part))

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from ..licences import package_folder
-from ..statuses import GAMS_INTEGER, GAMS_NORMAL, Status, is_gap_closed, status_of_gams
+from ..statuses import status_of_gams
 from . import casadi as casadi_program
 from .model_content import Behaviour, Points
 from .protocol import Job, Outcome, RefusedError, TooLargeError, run_command, write_in_full
@@ -137,12 +137,7 @@ def outcome_of(log: str) -> Outcome:
     """Return what log and listing of a run state: status, words and dual bound."""
     model, state = (_find_integer(rf"\*\*\*\* {kind} STATUS +(\d+)", log) for kind in ("MODEL", "SOLVER"))
     status, words = status_of_gams(model, state)
-    bound = _find_number(r"^Best possible *[=:] *(\S+)$", log)
-    objective = _find_number(r"\*\*\*\* OBJECTIVE VALUE +(\S+)$", log)
-    at_gap = (model, state) == (GAMS_INTEGER, GAMS_NORMAL)
-    if at_gap and bound is not None and objective is not None and is_gap_closed(bound, objective):
-        status = Status.OPTIMAL_GLOBAL
-    return Outcome(status, words, bound)
+    return Outcome(status, words, _find_number(r"^Best possible *[=:] *(\S+)$", log))
 
 
 def _find_integer(pattern: str, log: str) -> int:

@@ -13,6 +13,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ..statuses import Status
 from ..writing.terms import terms_of_entries
 from .model_content import Algebra, Behaviour, Points
 from .protocol import Job, Outcome, RefusedError, run_command, run_program, write_in_full
@@ -20,6 +21,7 @@ from .protocol import Job, Outcome, RefusedError, run_command, run_program, writ
 _FLAGS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
 _OBJECTIVE: Final = "energy"
 _ROUNDING: Final = 1e-14
+_IN_GAP: Final = "MIP GAP TOLERANCE REACHED"
 
 
 def version() -> str:
@@ -146,5 +148,5 @@ def solve(job: Job) -> Outcome:
     """Solve the file; the solution is the file of `-w`, whose columns have no names."""
     limits = ("--tmlim", str(max(1, int(job.seconds))), "--mipgap", f"{job.gap:g}")
     with write_in_full(job.solution) as part:
-        _run(job.model, *limits, "-w", str(part))
-    return Outcome()
+        output = _run(job.model, *limits, "-w", str(part))
+    return Outcome(Status.OPTIMAL_IN_GAP if _IN_GAP in output else None)

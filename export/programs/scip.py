@@ -15,7 +15,7 @@ import numpy as np
 import pyscipopt
 
 from ...models.processes.child_program import on_stop
-from ..statuses import SCIP_GAP, Status, is_gap_closed, status_of_scip
+from ..statuses import claim_of
 from ..writing.stamps import is_one_column
 from ..writing.terms import Terms, terms_of_entries
 from .model_content import Algebra, Behaviour, Points, finite_or_none
@@ -184,12 +184,10 @@ def solve(job: Job) -> Outcome:
         scip.addSol(scip.readSolFile(str(job.start)))
     with on_stop(scip.interruptSolve):
         scip.optimizeNogil()
-    words, bound = scip.getStatus(), finite_or_none(scip.getDualbound())
-    status = status_of_scip(words)
+    status, words = claim_of(scip.getStatus(), "scip")
+    bound = finite_or_none(scip.getDualbound())
     if not scip.getNSols():
         return Outcome(status.without_point, words, bound, scip.getNTotalNodes())
     with write_in_full(job.solution) as part:
         scip.writeBestSol(str(part))
-    if words == SCIP_GAP and bound is not None and is_gap_closed(bound, scip.getPrimalbound()):
-        status = Status.OPTIMAL_GLOBAL
     return Outcome(status, words, bound, scip.getNTotalNodes())

@@ -13,7 +13,7 @@ with warnings.catch_warnings(action="ignore"):  # it prints which licence it use
 
 from ...models.processes.child_program import on_stop
 from ...models.storage import replacing
-from ..statuses import XPRESS, Status
+from ..statuses import claim_of
 from ..writing.terms import Terms, merged_terms, terms_of_entries, terms_of_triangle
 from .model_content import Algebra, finite_or_none, with_infinities
 from .protocol import Job, Outcome, RefusedError, TooLargeError
@@ -102,8 +102,7 @@ def solve(job: Job) -> Outcome:
             _, solution_status = model.optimize()
     except (xpress.ModelError, xpress.SolverError, xpress.InterfaceError) as error:
         _raise_refusal(error)
-    words = str(solution_status).removeprefix("SolStatus.")
-    status = XPRESS.get(solution_status.name, Status.ERROR)
+    status, words = claim_of(solution_status.name, "xpress")
     mixed = model.attributes.mipents or model.attributes.qconstraints
     bound, nodes = (
         (finite_or_none(model.attributes.bestbound), model.attributes.nodes) if mixed else (None, None)

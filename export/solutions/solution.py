@@ -7,16 +7,16 @@ file (status, objective, bound) is passed on only if the file states its problem
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isfinite
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from ...models.arguments import check_flag
-from ...models.errors import SolutionError, UnsupportedByFormatError, naming
+from ...models.errors import InputError, SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem, Violation, with_products_lifted
 from ...models.instance.domain import Floats
@@ -94,6 +94,8 @@ class Solution:
         Number of nodes of the search tree, if reported.
     digits
         How the program writes all digits, if its layout rounds values.
+    silent
+        How the program writes its status, if its layout has none.
 
     """
 
@@ -114,6 +116,7 @@ class Solution:
     tolerance: float = TOLERANCE
     nodes: int | None = None
     digits: str = ""
+    silent: str = ""
 
     def __repr__(self) -> str:
         numbers = {"objective": self.objective, "bound": self.bound, "gap": self.gap}
@@ -149,13 +152,16 @@ class Solution:
         A violation beyond the tolerance contradicts a status that promises a point, and a point without one
         contradicts `infeasible`. Another objective contradicts an objective, and an objective below it a dual
         bound. The tolerance is relative to the largest coefficient of the rows, or 1; it is not used for
-        objectives, which agree within AGREEMENT.
+        objectives, which agree within AGREEMENT. Nothing is unbounded: terms of objectives are at least 0, or
+        in columns with two bounds.
         """
+        if self.claimed is Status.UNBOUNDED:
+            return ("every objective of crossfield is bounded below",)
         if self.objective is None or self.violation is None:
             return ()
         if self.claimed.needs_point:
             return (*self._infeasibilities, *self._wrong_values(self.objective))
-        if self._infeasibilities or self.claimed is Status.UNBOUNDED:
+        if self._infeasibilities:
             return ()
         if self.claimed is Status.INFEASIBLE:
             return ("its point is feasible",)
@@ -206,13 +212,12 @@ class Solution:
     def status(self) -> Status:
         """The claim if it is kept; otherwise FEASIBLE for a feasible point, NO_POINT or ERROR, or UNKNOWN.
 
-        A feasible point counts although the file claims none, as after a failure. An optimum far above its
-        own dual bound is the best point at a limit, the gap that the user allowed.
+        A feasible point counts although the file claims none, as after a failure.
         """
         if self._has_unclaimed_point:
             return Status.FEASIBLE
         if self.is_trusted or self.claimed in {Status.NO_POINT, Status.ERROR}:
-            return Status.LIMIT_WITH_POINT if self._leaves_gap else self.claimed
+            return self._proven_claim
         if self.claimed is Status.LIMIT_WITHOUT_POINT:
             return Status.NO_POINT
         return Status.FEASIBLE if self.claimed.needs_point and not self.contradictions else Status.UNKNOWN
@@ -225,11 +230,23 @@ class Solution:
         return self.point is not None and self.claimed in silent and consistent
 
     @property
-    def _leaves_gap(self) -> bool:
-        """Whether the file calls a point optimal that is far above its own dual bound."""
-        if self.claimed is not Status.OPTIMAL_GLOBAL or self.objective is None or self.bound is None:
-            return False
-        return not is_gap_closed(self.bound, self.objective)
+    def _proven_claim(self) -> Status:
+        """The claim as far as a dual bound or the kind of problem proves it.
+
+        A bound that closes the gap proves an optimum; one that leaves a gap makes it the best point at a
+        limit. Without integers, a convex problem is solved to its optimality conditions, so that there is no
+        gap to choose.
+        """
+        if self.objective is None or not (self.claimed.is_optimal or self.claimed is Status.FEASIBLE):
+            return self.claimed
+        if self.bound is not None and is_gap_closed(self.bound, self.objective):
+            return Status.OPTIMAL_GLOBAL
+        if self.claimed not in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_IN_GAP}:
+            return self.claimed
+        if self.bound is not None:
+            return Status.LIMIT_WITH_POINT
+        has_no_gap = self.problem.is_convex and not self.problem.integer.any()
+        return Status.OPTIMAL_GLOBAL if has_no_gap else self.claimed
 
     @property
     def bound(self) -> float | None:
@@ -262,13 +279,26 @@ class Solution:
     @property
     def caveat(self) -> str:
         """Why claims of the file are not kept although its point can be used; empty if all are kept."""
-        if self._leaves_gap:
-            return f"its dual bound {self.bound:.6g} leaves a gap, so it is not optimal within 1e-4"
-        if self.is_trusted or self.contradictions:
+        if self.contradictions:
+            return ""
+        if self.is_trusted and self.point is not None:
+            return self._open_question
+        if self.is_trusted:
             return ""
         if not self.identified:
             return f"not kept ({self.claimed}): the file is of an unidentified problem"
         return f"not kept ({self.claimed}): the point is feasible only within {self.tolerance:g}"
+
+    @property
+    def _open_question(self) -> str:
+        """What a file whose claims are kept does not prove about its point, and how to state it."""
+        if self.claimed.is_optimal and self.status is Status.LIMIT_WITH_POINT:
+            return f"its dual bound {self.bound:.6g} leaves a gap, so it is not optimal within 1e-4"
+        if self.status is Status.OPTIMAL_IN_GAP:
+            return "optimal within a gap that is not in it: --gap X states the gap, --bound X the dual bound"
+        if self.status is Status.FEASIBLE and not self.message:
+            return f"it states no status; {self.silent or '--bound X states the dual bound of the program'}"
+        return ""
 
     @cached_property
     def objective(self) -> float | None:
@@ -344,6 +374,8 @@ def read_solution(
     tolerance: float = TOLERANCE,
     identified: bool = False,
     solution: int | None = None,
+    stated_gap: float | None = None,
+    stated_bound: float | None = None,
 ) -> Solution:
     """Read a solver's answer to a problem; the kind of file is detected from its content.
 
@@ -368,6 +400,11 @@ def read_solution(
     solution
         Number of a solution, from 1, in a file that holds several. By default the best: that of least stated
         objective, or the first if not every one states its objective.
+    stated_gap
+        Relative gap that the program was given, at least 0, for a file that calls its point optimal without
+        a dual bound. The bound is the objective minus this part of it.
+    stated_bound
+        Dual bound that the program has proven, for a file that does not state it. The greater one counts.
 
     Returns
     -------
@@ -377,20 +414,41 @@ def read_solution(
     Raises
     ------
     InputError
-        If the file cannot be read.
+        If the file cannot be read, or gap or bound are not numbers in their range.
     SolutionError
-        If it is damaged, or states or fits another problem.
+        If it is damaged, or states or fits another problem; or if a gap is given for a file that does not
+        call its point optimal.
 
     """
     check_flag("identified", identified)
+    if not 0 <= (stated_gap or 0.0) < inf or not isfinite(stated_bound or 0.0):
+        words = f"the gap {stated_gap} or the bound {stated_bound} is out of range"
+        raise InputError(f"{words}; give finite numbers, and no gap below 0")
     raw = read_raw(path, solution)
     with naming(path):
-        known = is_identified(raw.stamps, problem.stamp) or identified
+        facts = {
+            "identified": is_identified(raw.stamps, problem.stamp) or identified,
+            "tolerance": tolerance,
+        }
         if not raw.has_point:
-            return _solution(raw, problem, None, identified=known, tolerance=tolerance)
-        return _map_values(
-            raw, _canonical_form(raw, problem, held or {}), identified=known, tolerance=tolerance
-        )
+            return _solution(raw, problem, None, **facts)
+        answer = _map_values(raw, _canonical_form(raw, problem, held or {}), **facts)
+        return with_bounds(answer, stated_gap, stated_bound)
+
+
+def with_bounds(answer: Solution, gap: float | None, bound: float | None = None) -> Solution:
+    """An answer with the greatest of its own dual bound, a given one, and the one that a gap proves.
+
+    A gap adds nothing to an optimum that is proven without it. Raises SolutionError as `read_solution`.
+    """
+    objective, bounds = answer.objective, [answer.claimed_bound, bound]
+    if gap is not None and objective is not None and answer.status is not Status.OPTIMAL_GLOBAL:
+        if answer.claimed not in {Status.OPTIMAL_GLOBAL, Status.OPTIMAL_IN_GAP}:
+            raise SolutionError(
+                f"claims {answer.claimed}, so that a gap proves nothing; --bound X states a dual bound"
+            )
+        bounds.append(objective - gap * abs(objective))
+    return replace(answer, claimed_bound=max((b for b in bounds if b is not None), default=None))
 
 
 def _canonical_form(raw: RawSolution, problem: Problem, held: Mapping[str, Problem]) -> CanonicalForm:
@@ -413,16 +471,20 @@ def _problem_in_file(problem: Problem, name: str) -> Problem:
 
 
 def _solution(raw: RawSolution, problem: Problem, point: Floats | None, **facts: Any) -> Solution:
+    # HiGHS solves convex problems only, and may call a stationary point of another one optimal.
+    continuous = not (problem.is_convex or problem.integer.any())
+    local = continuous and raw.reader == "highs" and raw.status.is_optimal
     return Solution(
         problem,
         point,
-        raw.status,
+        Status.OPTIMAL_LOCAL if local else raw.status,
         raw.message,
         raw.reader,
         reported=raw.objective,
         claimed_bound=raw.bound,
         order="" if raw.names is not None else raw.order,
         digits=raw.rounded,
+        silent=raw.silent,
         **facts,
     )
 

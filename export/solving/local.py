@@ -46,7 +46,7 @@ from ..programs.protocol import (
     call_program,
     part_path,
 )
-from ..solutions.solution import Solution, read_solution
+from ..solutions.solution import Solution, read_solution, with_bounds
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Suitability, suitability_in_format
 from ..statuses import Status
 from ..writing.sink import save_file
@@ -321,6 +321,8 @@ class Solvers:
         finally:
             files.start.unlink(missing_ok=True)
         solution = _read_answer(held, files, outcome, entry)
+        if solution.status is Status.OPTIMAL_IN_GAP:
+            solution = with_bounds(solution, limits.gap)
         unsolved = solution.status == Status.LIMIT_WITHOUT_POINT
         if unsolved and point is not None and held.violation(point).worst <= FEASIBLE:
             solution = _write_start_as_answer(held, point, files, outcome, entry)

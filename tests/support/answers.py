@@ -11,12 +11,13 @@ HERE = places.SOLUTIONS
 TINY = HERE / "tiny"
 GOOD = sorted(path for path in TINY.iterdir() if path.is_file())
 BAD = sorted((TINY / "bad").iterdir())
-WITH_POINT = {"optimal-global", "optimal-local", "feasible", "limit-with-point"}
+WITH_POINT = {"optimal-global", "optimal-in-gap", "optimal-local", "feasible", "limit-with-point"}
 
 G, C, S, B, K, X = "gurobi-13.0.3", "cplex-22.2.0.1", "scip-10.0", "cbc-2.10.8", "glpk-5.0", "xpress-9.9.1"
 A, R = "gams-54.6.1", "baron-26.5.27"
 L, Y, Q = "lp_solve-5.5.2.5", "symphony-5.6.17", "qsopt_ex-2.5.10.3"
 GLOBAL, LOCAL, FEASIBLE, INFEASIBLE = "optimal-global", "optimal-local", "feasible", "infeasible"
+IN_GAP = "optimal-in-gap"
 LIMIT, NOTHING, UNBOUNDED, ERROR = "limit-with-point", "limit-without-point", "unbounded", "error"
 SILENT = "no-point"
 
@@ -24,16 +25,16 @@ FILES = {
     f"{G}_milp_optimal.sol": ("gurobi", FEASIBLE),
     f"{G}_qp_optimal.sol": ("gurobi", FEASIBLE),
     f"{G}_quartic_optimal.sol": ("gurobi", FEASIBLE),
-    f"{G}_milp_optimal.json": ("gurobi-json", GLOBAL),
-    f"{G}_milp_pool.json": ("gurobi-json", GLOBAL),
-    f"{G}_qp_optimal.json": ("gurobi-json", GLOBAL),
-    f"{G}_quartic_optimal.json": ("gurobi-json", GLOBAL),
+    f"{G}_milp_optimal.json": ("gurobi-json", IN_GAP),
+    f"{G}_milp_pool.json": ("gurobi-json", IN_GAP),
+    f"{G}_qp_optimal.json": ("gurobi-json", IN_GAP),
+    f"{G}_quartic_optimal.json": ("gurobi-json", IN_GAP),
     f"{G}_milp_infeasible.json": ("gurobi-json", INFEASIBLE),
     f"{G}_milp_time_without_point.json": ("gurobi-json", NOTHING),
     f"{G}_milp_nodes_with_point.json": ("gurobi-json", LIMIT),
     f"{C}_milp_optimal.sol": ("cplex", GLOBAL),
     f"{C}_milp_optimal_nonzero.sol": ("cplex", GLOBAL),
-    f"{C}_milp_within_tolerance.sol": ("cplex", GLOBAL),
+    f"{C}_milp_within_tolerance.sol": ("cplex", IN_GAP),
     f"{C}_milp_pool.sol": ("cplex", LIMIT),
     f"{C}_qp_optimal.sol": ("cplex", GLOBAL),
     f"{C}_milp_infeasible.sol": ("cplex", INFEASIBLE),
@@ -50,8 +51,8 @@ FILES = {
     f"{S}_milp_time_without_point.sol": ("scip", NOTHING),
     f"{S}_milp_solution_limit.sol": ("scip", LIMIT),
     f"{S}_other_infinite.sol": ("scip", FEASIBLE),
-    f"{B}_milp_optimal.sol": ("cbc", GLOBAL),
-    f"{B}_milp_optimal_all.sol": ("cbc", GLOBAL),
+    f"{B}_milp_optimal.sol": ("cbc", IN_GAP),
+    f"{B}_milp_optimal_all.sol": ("cbc", IN_GAP),
     f"{B}_milp_infeasible.sol": ("cbc", INFEASIBLE),
     f"{B}_milp_infeasible_all.sol": ("cbc", INFEASIBLE),
     f"{B}_milp_solution_limit.sol": ("cbc", LIMIT),
@@ -67,15 +68,15 @@ FILES = {
     f"{X}_milp_time_without_point.slx": ("xpress-slx", FEASIBLE),
     f"{X}_milp_infeasible.slx": ("xpress-slx", SILENT),
     "xpress-by-layout_milp_two_solutions.slx": ("xpress-slx", FEASIBLE),
-    f"{A}_cplex_milp_optimal.csv": ("gams-csv", GLOBAL),
+    f"{A}_cplex_milp_optimal.csv": ("gams-csv", IN_GAP),
     f"{A}_conopt_qp_optimal.csv": ("gams-csv", LOCAL),
-    f"{A}_baron_quartic_optimal.csv": ("gams-csv", GLOBAL),
-    f"{A}_sbb_quartic_optimal.csv": ("gams-csv", FEASIBLE),
+    f"{A}_baron_quartic_optimal.csv": ("gams-csv", IN_GAP),
+    f"{A}_sbb_quartic_optimal.csv": ("gams-csv", IN_GAP),
     f"{A}_baron_quartic_time_with_point.csv": ("gams-csv", LIMIT),
     f"{A}_cplex_milp_time_without_point.csv": ("gams-csv", NOTHING),
     f"{A}_cplex_milp_infeasible.csv": ("gams-csv", INFEASIBLE),
-    f"{R}_qp_optimal_res.lst": ("baron-res", GLOBAL),
-    f"{R}_pair_optimal_res.lst": ("baron-res", GLOBAL),
+    f"{R}_qp_optimal_res.lst": ("baron-res", IN_GAP),
+    f"{R}_pair_optimal_res.lst": ("baron-res", IN_GAP),
     f"{R}_pair_first_point_res.lst": ("baron-res", FEASIBLE),
     f"{R}_pair_iterations_with_point_res.lst": ("baron-res", LIMIT),
     f"{R}_qp_infeasible_res.lst": ("baron-res", INFEASIBLE),
@@ -85,7 +86,7 @@ FILES = {
     f"{X}_milp_optimal.asc": ("xpress-asc", FEASIBLE),
     "mip-2.0.0_milp_optimal.sol": ("python-mip", FEASIBLE),
     "copt-8.0.7_milp_optimal.sol": ("gurobi", FEASIBLE),
-    "cuopt-by-layout_milp_optimal.sol": ("cuopt", GLOBAL),
+    "cuopt-by-layout_milp_optimal.sol": ("cuopt", LOCAL),
     "cuopt-by-layout_milp_infeasible.sol": ("cuopt", INFEASIBLE),
     f"{L}_milp_optimal.txt": ("lp_solve", FEASIBLE),
     f"{L}_milp_infeasible.txt": ("lp_solve", INFEASIBLE),
@@ -95,12 +96,12 @@ FILES = {
     f"{Q}_milp_optimal_fixed.sol": ("qsopt_ex", GLOBAL),
     f"{Q}_milp_relaxed.sol": ("qsopt_ex", GLOBAL),
     f"{Q}_milp_infeasible.sol": ("qsopt_ex", INFEASIBLE),
-    "mosek-by-layout_milp_optimal.int": ("mosek", GLOBAL),
-    "gams-by-layout_milp_optimal.lst": ("gams-listing", GLOBAL),
+    "mosek-by-layout_milp_optimal.int": ("mosek", IN_GAP),
+    "gams-by-layout_milp_optimal.lst": ("gams-listing", IN_GAP),
     "gams-by-layout_milp_display.txt": ("gams-display", FEASIBLE),
     "ampl-by-layout_milp_display.txt": ("ampl-display", FEASIBLE),
     "cplex-by-layout_milp_display.txt": ("cplex-display", GLOBAL),
-    "pulp-3.3.2_milp_optimal.json": ("json", GLOBAL),
+    "pulp-3.3.2_milp_optimal.json": ("json", IN_GAP),
     "pulp-3.3.2_milp_infeasible.json": ("json", INFEASIBLE),
     "pulp-3.3.2_milp_optimal_prints.txt": ("pairs", FEASIBLE),
     "pyomo-6.10.1_milp_optimal.json": ("json", LOCAL),
@@ -115,15 +116,22 @@ FILES = {
     "miplib-by-layout_milp_optimal.sol": ("miplib", FEASIBLE),
     "miplib-by-layout_milp_infeasible.sol": ("miplib", INFEASIBLE),
     # Answers in other text: logs, prints and mails.
-    "highs-1.15.1_milp_optimal_log.txt": ("highs", GLOBAL),
+    "highs-1.15.1_milp_optimal_log.txt": ("highs", IN_GAP),
     f"{S}_milp_optimal_log.txt": ("scip", FEASIBLE),
-    f"{B}_milp_optimal_log.txt": ("cbc", GLOBAL),
+    f"{B}_milp_optimal_log.txt": ("cbc", IN_GAP),
     f"{K}_milp_optimal_log.txt": ("glpk", GLOBAL),
     "neos-by-layout_milp_optimal_scip.txt": ("scip", FEASIBLE),
     "neos-by-layout_milp_optimal_ampl.txt": ("ampl-display", FEASIBLE),
     "mail-by-layout_milp_list.txt": ("list-in-text", FEASIBLE),
 }
 """Every file of the folder: its reader and what it claims."""
+
+PROVEN = {
+    *(f"{G}_{kind}.json" for kind in ("milp_optimal", "milp_pool", "qp_optimal", "quartic_optimal")),
+    *(f"{R}_{kind}_optimal_res.lst" for kind in ("qp", "pair")),
+    "pyomo-6.10.1_milp_optimal.json", "pyomo-6.10.1_milp_optimal.yml",
+}  # fmt: skip
+"""Files that state the bound or the gap of their optimum, or are of a problem without a gap."""
 
 RELAXATIONS = {"milp_time_without_point", "milp_relaxed"}
 """Files that hold the point of a relaxation, as the solver writes it."""

@@ -9,9 +9,9 @@
 
     The above solution has an objective value of:  -14.4
 
-Normal completion is a global proof: of the optimum, of infeasibility without a table, of unboundedness
-when a ray follows it. It is not a proof when the options FirstFeas or FirstLoc stopped the search: then the
-point counts as feasible. sum.lst begins like
+Normal completion proves an optimum within the gaps that the file states, infeasibility without a table,
+unboundedness when a ray follows it. It proves nothing when an option may have ended the search earlier
+(FirstFeas, FirstLoc, DeltaTerm, Target): then the point counts as feasible. sum.lst begins like
 res.lst and has no values: it is refused. Layouts: BARON 26.5.27; codes: BARON.jl and Pyomo's reader.
 """
 
@@ -23,7 +23,7 @@ from typing import Final
 from ....models.errors import SolutionError
 from ....models.instance.domain import Floats
 from ...statuses import Status, status_of_baron
-from .grammar import EntryForm
+from .grammar import EntryForm, float_of, is_number
 from .text import (
     Bytes,
     Cursor,
@@ -41,7 +41,10 @@ _TABLE: Final = b"\nThe best solution found is"
 _HEADER: Final = b"variable"
 _ROW: Final = EntryForm("name number value number")
 _OBJECTIVE: Final = b"The above solution has an objective value of:"
-_FIRST = re.compile(rb"^ +first(?:feas|loc) += +1$", re.MULTILINE)
+_EARLY = re.compile(
+    rb"^ +(?:first(?:feas|loc)|deltaterm) += +1$|^ +target += +(?!-0\.1000E\+52)", re.MULTILINE
+)
+_GAP = re.compile(rb"^ +eps(a|r) += +(\S+)$", re.MULTILINE)
 _POINT: Final = b">>> Objective value is:"
 _INFINITE: Final = 1e50
 _RAY: Final = b"unbounded ray:"
@@ -57,7 +60,7 @@ def parse_results(data: bytes) -> RawSolution:
     words = one_line(banners[-1])
     at = data.rfind(_TABLE)
     status = status_of_baron(words, has_table=at >= 0, unbounded=_RAY in data[max(at, 0) :])
-    if status is Status.OPTIMAL_GLOBAL and _FIRST.search(data):
+    if status.is_optimal and _EARLY.search(data):
         status = Status.FEASIBLE
     if at < 0 or status is Status.UNBOUNDED:
         if at < 0 and _POINT in data:
@@ -68,7 +71,14 @@ def parse_results(data: bytes) -> RawSolution:
     names, values, objective = _table(data, at + 1)
     if abs(objective) >= _INFINITE:
         return solution_without_point(Status.UNBOUNDED, words)
-    return RawSolution(status, words, objective, names, values)
+    bound = _bound(data, objective) if status.is_optimal else None
+    return RawSolution(status, words, objective, names, values, bound=bound)
+
+
+def _bound(data: bytes, objective: float) -> float | None:
+    """The dual bound that an optimum within the stated gaps proves; None if the file does not state them."""
+    gaps = {name: float_of(word) for name, word in _GAP.findall(data) if is_number(word)}
+    return objective - max(gaps[b"a"], gaps[b"r"] * abs(objective)) if len(gaps) > 1 else None
 
 
 def _table(data: bytes, position: int) -> tuple[Bytes, Floats, float]:

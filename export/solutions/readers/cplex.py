@@ -15,7 +15,6 @@ infeasible problem also has values, which are not a point. Without any solution 
 
 from __future__ import annotations
 
-import re
 import sys
 from array import array
 from dataclasses import dataclass, field
@@ -26,7 +25,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import DefusedXMLParser
 
 from ....models.errors import SolutionError
-from ...statuses import CPLEX, CPLEX_STOPPED, Status
+from ...statuses import Status, claim_of
 from .grammar import float_of, is_number
 from .text import (
     RawSolution,
@@ -85,12 +84,9 @@ def _with_point(entry: _SolutionEntry, status: Status, words: str) -> RawSolutio
 
 
 def _status(header: dict[str, str]) -> Status:
-    text = header.get("solutionStatusValue", "")
-    code = int(text) if re.fullmatch(r"[0-9]{1,6}", text) else -1
-    if code in CPLEX_STOPPED:
-        feasible = header.get("primalFeasible") == "1"
-        return Status.LIMIT_WITH_POINT if feasible else Status.LIMIT_WITHOUT_POINT
-    return CPLEX.get(code, Status.ERROR)
+    status, _ = claim_of(header.get("solutionStatusValue", ""), "cplex")
+    stopped = status is Status.LIMIT_WITH_POINT
+    return status.without_point if stopped and header.get("primalFeasible") != "1" else status
 
 
 @dataclass

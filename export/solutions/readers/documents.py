@@ -7,19 +7,17 @@
 
 Gurobi (GRBwrite; attribute names of its manual) omits columns at 0 unless JSONSolDetail is 1; then each has a
 list PoolNX of its values in all solutions, the incumbent first. Without a solution there is no Vars, and
-bounds are 1e+100. Pyomo omits columns at 0 too. Where the solver is unknown, an optimum counts as local. An
-object with the same key twice is refused.
+bounds are 1e+100. Pyomo omits columns at 0 too. An object with the same key twice is refused.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
 from ....models.errors import SolutionError
-from ...statuses import GUROBI, PULP, PYOMO, Status
+from ...statuses import Status, claim_of
 from .grammar import quoted
 from .text import (
     RawSolution,
@@ -42,35 +40,34 @@ DocumentPath = tuple[str | int | None, ...]
 
 @dataclass(frozen=True)
 class _DocumentLayout:
-    """Paths to the columns and claims of a document; states: what a status means, and its words."""
+    """Paths to the columns and claims of a document; table: its rows in the table of statuses."""
 
     title: str
     columns: DocumentPath
     status: DocumentPath
-    states: Mapping[Any, tuple[Status, str]]
+    table: str
     objective: DocumentPath = ()
     bound: DocumentPath = ()
     omits_zeros: bool = False
 
 
-_PLAIN: Final = {word.casefold(): (status, word) for word, status in PYOMO.items()}
 _GUROBI: Final = _DocumentLayout(
     "Gurobi .json",
     ("Vars",),
     ("SolutionInfo", "Status"),
-    GUROBI,
+    "gurobi-json",
     ("SolutionInfo", "ObjVal"),
     ("SolutionInfo", "ObjBound"),
     omits_zeros=True,
 )
 _CLAIMS: Final = {"status", "objective", "bound"}
 _OTHERS: Final = (
-    _DocumentLayout("PuLP", ("variables",), ("parameters", "sol_status"), PULP),
+    _DocumentLayout("PuLP", ("variables",), ("parameters", "sol_status"), "pulp"),
     _DocumentLayout(
         "Pyomo",
         ("Solution", 1, "Variable"),
         ("Solver", 0, "Termination condition"),
-        _PLAIN,
+        "other",
         ("Solution", 1, "Objective", None, "Value"),
         ("Problem", 0, "Lower bound"),
         omits_zeros=True,
@@ -96,21 +93,17 @@ def parse_document(data: bytes) -> RawSolution:
     if inner == "columns":
         content |= {inner: {key: value for key, value in content.items() if key not in _CLAIMS}}
     return _solution(
-        content, _DocumentLayout("plain", (inner,), ("status",), _PLAIN, ("objective",), ("bound",))
+        content, _DocumentLayout("plain", (inner,), ("status",), "other", ("objective",), ("bound",))
     )
 
 
 def _solution(content: dict[str, Any], layout: _DocumentLayout) -> RawSolution:
     """The solution of a document; a status that is no point leaves its values out."""
     code, columns = _at(content, layout.status), _at(content, layout.columns)
-    if isinstance(code, str):
-        status, words = layout.states.get(code.casefold(), (Status.FEASIBLE, ""))[0], code
-    elif isinstance(code, int):
-        status, words = layout.states.get(code, (Status.ERROR, f"status {code}"))
-    else:
-        status, words = Status.FEASIBLE, ""
+    silent = Status.FEASIBLE, ""
+    status, words = claim_of(code, layout.table) if isinstance(code, (str, int)) else silent
     if columns is None or status in _POINTLESS:
-        if status is Status.OPTIMAL_GLOBAL:
+        if status.is_optimal:
             raise SolutionError(f"the file states optimal but holds no values; {_AGAIN}")
         return solution_without_point(status.without_point, words)
     names, values = named_values(*_columns(columns))

@@ -24,7 +24,7 @@ import numpy as np
 
 from ....models.errors import SolutionError
 from ....models.instance.domain import Floats
-from ...statuses import GLPK, Status
+from ...statuses import Status, claim_of
 from ...writing.canonical import ColumnOrder
 from .grammar import EntryForm, place_of_entry, quoted
 from .text import Cursor, RawSolution, Reader, line_error, read_entries, solution_without_point
@@ -100,7 +100,7 @@ def _summary(cursor: Cursor) -> _Summary:
     match = _SUMMARY.fullmatch(line)
     if match is None:
         raise cursor.fault(f"{quoted(line)} is not kind, rows, columns, status and objective")
-    status = GLPK.get(match[4].decode(errors="replace"), Status.LIMIT_WITHOUT_POINT)
+    status, _ = claim_of(match[4].decode(errors="replace"), "glpk")
     return _Summary(_FORMS[match[1]], int(match[2]), int(match[3]), status, cursor.number(match[5]))
 
 

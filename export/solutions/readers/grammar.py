@@ -186,7 +186,8 @@ class TextLayout:
     off, and what is missing then. pointless: pattern of a status whose values are no point. refusals:
     patterns of lines that no answer has, and what the text is. omits_zeros: whether columns at 0 are left
     out; None: if there is no 0 in the text. rewrites: a literal, and pattern and replacement of the places
-    that have it. digits: how the program writes all digits, if it rounds them here.
+    that have it. digits: how the program writes all digits, if it rounds them here. silent: how it writes its
+    status, if it has none here.
     """
 
     name: str
@@ -206,6 +207,7 @@ class TextLayout:
     rewrites: tuple[tuple[bytes, bytes, bytes | Callable[[re.Match[bytes]], bytes]], ...] = ()
     heads: bool = True
     digits: str = ""
+    silent: str = ""
 
     def recognises(self, head: bytes) -> bool:
         """Whether a text with this start has the layout."""

@@ -59,6 +59,7 @@ SCIP = TextLayout(
     refusals=((rb"objective value:\s+unknown", "this is a partial solution, with columns of unknown value"),),
     needs=(("objective", "objective"),),
     omits_zeros=True,
+    silent="SCIP's command `write solution` states it; --bound X states the dual bound (getDualbound)",
 )
 r"""As SCIP 10.0 writes it (SCIPprintStatus has the words):
 
@@ -79,6 +80,7 @@ XPRESS = TextLayout(
     begin=rb"NAME(?: .*)?",
     end=rb"ENDATA",
     needs=(("end", "line ENDATA"),),
+    silent="Xpress writes none; --bound X states the dual bound (attribute bestbound)",
 )
 """As Xpress 9.9.1 writes it:
 
@@ -161,6 +163,7 @@ LIST = TextLayout(
         rb"|%b[ \t]*(?![#=]|[\d.+\-]*[\0- ])[^\0- ]+[ \t]+%b[ \t]*(?:\n|\Z))"
     )
     % (FEW_LINES, OUR_NAME, FEW_LINES, NUMBER),
+    silent="Gurobi states it in a .json (write)",
     refusals=(
         (
             rb"# ?MIP (?:start|hints)\b.*",

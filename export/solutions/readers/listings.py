@@ -129,7 +129,7 @@ LISTINGS = (
         "CPLEX, display solution variables -",
         signature=_SOLVED + rb"[^\n]*(?:Objective =|infeasible|no integer solution)",
         claims=(
-            _SOLVED + rb"(?:Integer )?(?P<status>[^\n,:]+).*Objective =\s+(?P<objective>\S+)",
+            _SOLVED + rb"(?:Integer )?(?P<status>[^\n,:]+(?:, tolerance)?).*Objective =\s+(?P<objective>\S+)",
             _SOLVED + rb"(?:Integer )?(?P<none>(?P<status>[^\n,:]+)).*",
         ),
         begin=rb"Variable Name\s+Solution Value",

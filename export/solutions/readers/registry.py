@@ -19,7 +19,7 @@ import numpy as np
 from ....models.errors import SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.storage import read_bytes
-from ...statuses import HIGHS, PYOMO, Status, status_of_cbc, status_of_gams, status_of_scip, status_of_words
+from ...statuses import Status, claim_of, status_of_gams
 from ...writing.stamps import digits_in_columns, digits_in_text
 from . import ampl, baron, cplex, documents, glpk
 from .grammar import HEAD, Scan, error_at, plain_text
@@ -38,34 +38,35 @@ _PACKED: Final[dict[bytes, Callable[[io.BytesIO], Any]]] = {
 
 
 def _claim_of_highs(scan: Scan) -> tuple[Status, str]:
-    status = HIGHS.get(scan.status, Status.ERROR)
-    if status is Status.OPTIMAL_GLOBAL and "none" in scan.claims:
+    status, words = claim_of(scan.status, "highs")
+    if status.is_optimal and "none" in scan.claims:
         raise error_at(scan.data, scan.places["none"], "the file is Optimal but holds no point")
     denied = scan.claims.get("primal", b"").lower() not in {b"feasible", b""}
-    return status.without_point if denied else status, scan.status
+    return status.without_point if denied else status, words
 
 
 def _claim_of_gams(scan: Scan) -> tuple[Status, str]:
     return status_of_gams(int(scan.status), int(scan.claims["solver"]))
 
 
-def _claim_by(table: Callable[[str], Status]) -> Claim:
-    """The claim of a text that states a status in words, or none."""
-    return lambda scan: (table(scan.status) if scan.status else Status.FEASIBLE, scan.status)
+def _claim_by(*layouts: str) -> Claim:
+    """The claim of a text that states a status in words of these layouts, or none."""
+    return lambda scan: claim_of(scan.status, *layouts) if scan.status else _SILENT
 
+
+_SILENT: Final = Status.FEASIBLE, ""
 
 _CLAIMS: Final[dict[str, Claim]] = {
     "highs": _claim_of_highs,
     "gams-csv": _claim_of_gams,
     "gams-listing": _claim_of_gams,
-    "scip": _claim_by(status_of_scip),
-    "cbc": _claim_by(status_of_cbc),
-    "pyomo": _claim_by(lambda words: PYOMO.get(words, Status.FEASIBLE)),
+    "scip": _claim_by("scip"),
+    "cbc": _claim_by("cbc"),
 }
-"""Functions that return the claim of a text, by layout; the others state a status in words at most."""
+"""Functions that return the claim of a text, by layout; the others may use words of any program."""
 
 _LISTS: Final = tuple(
-    reader_of(layout, _CLAIMS.get(layout.name, _claim_by(status_of_words))) for layout in TEXT_LAYOUTS
+    reader_of(layout, _CLAIMS.get(layout.name, _claim_by(layout.name, "other"))) for layout in TEXT_LAYOUTS
 )
 PLAIN: Final = _LISTS[-4:]
 """Readers of lists without a mark of their program, for files that no other reader recognises."""

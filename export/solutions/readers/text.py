@@ -66,7 +66,8 @@ class RawSolution:
     of rows, whose values are left out.
     stamps: digits of the problem's stamp, or the first of them, wherever the solver repeated it. reader: name
     of the reader of the file.
-    rounded: how the program writes all digits, if it rounded them, or empty. pool: all solutions of a file
+    rounded: how the program writes all digits, if it rounded them, or empty. silent: how it writes its
+    status, if its layout has none, or empty. pool: all solutions of a file
     that holds several, in its order.
     """
 
@@ -83,6 +84,7 @@ class RawSolution:
     stamps: frozenset[str] = frozenset()
     reader: str = ""
     rounded: str = ""
+    silent: str = ""
     pool: tuple[RawSolution, ...] = ()
 
     @property
@@ -180,6 +182,7 @@ def _parse_answer(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
         bound=bound if bound is not None and np.isfinite(bound) else None,
         row_names=names[:first] if first else None,
         rounded=layout.digits,
+        silent=layout.silent,
     )
 
 

@@ -170,7 +170,7 @@ def test_objectives_in_comments_and_later_lines_are_claims(text, objective):
 
 
 @for_each("words, status", [
-        ("Optimal", "optimal-global"), ("optimal solution", "optimal-global"), ("Infeasible", "infeasible"),
+        ("Optimal", "optimal-local"), ("optimal solution", "optimal-local"), ("Infeasible", "infeasible"),
         ("locally optimal", "optimal-local"), ("Time limit reached", "limit-with-point"),
         ("unbounded", "unbounded"), ("whatever", "feasible"),
     ])  # fmt: skip

@@ -64,7 +64,7 @@ def test_faults_in_lists_and_documents_are_named(data, fault):
 @for_each("word, status", [
         ("optimal", "optimal-local"), ("feasible", "feasible"), ("infeasible", "infeasible"),
         ("unbounded", "unbounded"), ("maxTimeLimit", "limit-with-point"),
-        ("globallyOptimal", "optimal-global"), ("Optimal", "optimal-local"), ("words of a tool", "feasible"),
+        ("globallyOptimal", "optimal-in-gap"), ("Optimal", "optimal-local"), ("words of a tool", "feasible"),
     ])  # fmt: skip
 def test_claims_of_a_plain_document_are_kept(word, status):
     document = {"status": word, "objective": 3.5, "bound": 3, "variables": {"x": 2}}
@@ -74,7 +74,7 @@ def test_claims_of_a_plain_document_are_kept(word, status):
     assert (raw.objective, raw.bound) == ((None, None) if pointless else (3.5, 3))
 
 
-@for_each("code, status", [(1, "optimal-global"), (2, "feasible"), (0, "no-point"), (-1, "infeasible"),
+@for_each("code, status", [(1, "optimal-in-gap"), (2, "feasible"), (0, "no-point"), (-1, "infeasible"),
         (-2, "unbounded")])  # fmt: skip
 def test_codes_of_pulp_are_statuses(code, status):
     data = re.sub(rb'"sol_status": \d', b'"sol_status": %d' % code, text("pulp-3.3.2_milp_optimal.json"))
@@ -113,6 +113,7 @@ def test_python_mip_states_no_objective():
 
 @for_each("banner, status", [
         ("Time Limit Reached", "limit-with-point"), ("Optimal Solution Found", "optimal-global"),
+        ("Target Gap Achieved", "optimal-in-gap"),
         ("Stopping After Finding First Feasible Solution", "feasible"),
     ])  # fmt: skip
 def test_banners_of_symphony_are_statuses(banner, status):
@@ -121,7 +122,7 @@ def test_banners_of_symphony_are_statuses(banner, status):
 
 
 @for_each("words, status", [
-        ("Integer optimal, tolerance (0.0001/1e-06)", "optimal-global"),
+        ("Integer optimal, tolerance (0.0001/1e-06)", "optimal-in-gap"),
         ("Integer optimal solution", "optimal-global"), ("Aborted, integer feasible", "limit-with-point"),
         ("Time limit exceeded, integer feasible", "limit-with-point"),
     ])  # fmt: skip
@@ -138,13 +139,13 @@ def test_an_infeasible_problem_in_a_log_of_cplex():
 
 
 @for_each("code, status", [
-        (1, "optimal-global"), (2, "optimal-local"), (8, "feasible"), (10, "infeasible"), (4, "infeasible"),
-        (3, "unbounded"), (14, "limit-without-point"),
+        (1, "optimal-in-gap"), (2, "optimal-local"), (8, "optimal-in-gap"), (10, "infeasible"),
+        (4, "infeasible"), (3, "unbounded"), (14, "limit-without-point"),
     ])  # fmt: skip
 def test_states_in_a_gams_listing_are_statuses(code, status):
     data = text("gams-by-layout_milp_optimal.lst").replace(b"MODEL STATUS      1", b"MODEL STATUS %6d" % code)
     raw = parse_raw(data)
-    assert (raw.status, raw.has_point) == (status, status in {"optimal-global", "optimal-local", "feasible"})
+    assert (raw.status, raw.has_point) == (status, status in {"optimal-in-gap", "optimal-local"})
 
 
 def test_a_rounded_file_names_the_way_to_all_digits(tmp_path):
