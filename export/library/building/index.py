@@ -29,7 +29,6 @@ from ..documents.documents import (
     files_of_instance,
     load_document,
 )
-from ..documents.standalone import standalone_program
 from ..ledger.ledger import LEDGER, read_ledger
 from ..plan.recipe import NORMS, InstancePlan, norm_minimised
 from ..plan.spec import RUNGS, Spec
@@ -81,7 +80,7 @@ def general_files(
     context = _template_context(spec, sidecars) | {"skipped": skipped, "pictures": pictures}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
-    checkers = {CHECKER: standalone_program(Path(check_point.__file__))}
+    checkers = {CHECKER: read_bytes(check_point.__file__)}
     for program, key in ((check_certificate, "certified"), (check_orthogonal, "orthogonal")):
         if context[key]:
             path = Path(str(program.__file__))

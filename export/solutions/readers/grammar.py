@@ -4,8 +4,6 @@ A layout (`TextLayout`) declares what its lines look like. Blank lines, comments
 between the entries. Lines may end as on Windows or old Macs, words may be separated by tabs or form feeds,
 and the last line may lack its end. A regular expression checks a megabyte of entries at a time; only lines
 that are no entries are processed one by one.
-
-The standalone checker of a library contains this text: it needs Python 3.9 and the standard library alone.
 """
 
 from __future__ import annotations
@@ -124,7 +122,6 @@ class EntryForm:
         kinds = {"name": whole + letter + b"+", "word": whole + letter + b"+", "index": rb"\d{1,18}"}
         kinds.update(value=NUMBER, number=NUMBER)
         tokens = [kinds.get(word, re.escape(word.encode())) for word in self.words]
-        # Not possessive: Python 3.9 has no such repetition, and a word can end in one place only.
         line = rb"%b*(?!(?i:%b))%b%b*\n" % (BLANK, reserved, between.join(tokens), BLANK)
         self.line = re.compile(line)
         self.run = re.compile(rb"(?:%b|%b*\n)*" % (line, BLANK))
@@ -157,7 +154,7 @@ class EntryForm:
     def fault(self, line: bytes) -> str:
         """Reason why a line is no entry."""
         words = self.split(line)
-        pairs = list(zip(self.words, words))
+        pairs = list(zip(self.words, words, strict=False))
         if NOT_TEXT.search(line):
             return "there is a byte that is not text, the file is damaged"
         if max(map(len, words), default=0) > TOKEN_LIMIT:
@@ -232,7 +229,7 @@ class TextLayout:
             if not starts or any(form.anywhere.search(data, starts[-1], at) for form in _forms(self)):
                 starts.append(at)
         starts = starts or [0]
-        for start, stop in zip(starts, [*starts[1:], len(data)]):
+        for start, stop in zip(starts, [*starts[1:], len(data)], strict=True):
             yield b"\n" * data.count(b"\n", 0, start) + data[start:stop] if start else data[:stop]
 
 

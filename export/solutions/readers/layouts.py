@@ -1,7 +1,4 @@
-"""The table of text layouts: files with one name and one value per line, and what stands around them.
-
-The standalone checker of a library contains this text: it needs Python 3.9 and the standard library alone.
-"""
+"""The table of text layouts: files with one name and one value per line, and what stands around them."""
 
 from __future__ import annotations
 

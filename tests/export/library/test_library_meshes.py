@@ -8,7 +8,6 @@ import highspy
 import pytest
 from crossfield.export.library.building.table import read_table
 from crossfield.export.library.building.verification import verify_library
-from crossfield.export.library.documents import check_point
 from crossfield.export.library.plan.recipe import plan_library
 from crossfield.export.library.plan.spec import spec_of as spec_of_document
 from crossfield.models.errors import InputError
@@ -83,7 +82,6 @@ def test_an_optimum_of_a_mesh_comes_back_as_a_better_point(built, tmp_path):
     highs.run()
     answer = tmp_path / f"{name}.sol"
     highs.writeSolution(str(answer), 0)
-    assert check_point.check(str(model), str(answer)).worst < 1e-8
     field = cf.search(cf.read_instance(lib / f"{DISC}_box.instance.json"), rounds=4, jobs=1).field
     cf.write_field(field, tmp_path / "better.json")
     (tmp_path / "sent").mkdir()

@@ -1,7 +1,6 @@
 """Claims are checked against their points: relaxations, damaged files, codes of failure, foreign values."""
 
 import codecs
-import gzip
 import inspect
 import json
 import re
@@ -16,7 +15,6 @@ from answers import FILES, GOOD, TINY, WITH_POINT, problem, problem_of
 from cases import make_field, make_instance
 from crossfield.export.cli.app import invoke, read_command
 from crossfield.export.formats.registry import write
-from crossfield.export.library.documents import check_point
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.solution import AGREEMENT, LARGEST, TOLERANCE, Solution, read_solution
@@ -365,34 +363,3 @@ def test_a_byte_order_mark_changes_nothing(skew, tmp_path):
         (tmp_path / name).write_bytes(codecs.BOM_UTF8 + (skew / name).read_bytes())
     again = cf.read_manifest(tmp_path / f"skew.{MILP}.manifest.json").problem()
     assert again.sha256 == cf.read_manifest(skew / f"skew.{MILP}.manifest.json").problem().sha256
-
-
-# the standalone checker
-
-
-def test_the_checker_takes_no_empty_file_and_no_wrong_objective(tmp_path, capsys):
-    of = problem("milp")
-    write(of, tmp_path / "m.mps")
-    model, path = str(tmp_path / "m.mps"), tmp_path / "p.sol"
-
-    def code(text):
-        path.write_bytes(text)
-        return check_point.main([model, str(path)])
-
-    for empty in (
-        b"",
-        b"\n \n",
-        b"# Solution for model obj\n",
-        b"solution status: unknown\n",
-        gzip.compress(b""),
-    ):
-        assert code(empty) == 2
-        assert re.search("holds no point|has no objective", capsys.readouterr().err)
-    good = (TINY / "gurobi-13.0.3_milp_optimal.sol").read_bytes()
-    assert code(good) == 0
-    assert code(codecs.BOM_UTF8 + good) == 0
-    capsys.readouterr()
-    wrong = re.sub(rb"(?m)^(# Objective value = ).*$", rb"\g<1>0.25", good)
-    assert wrong != good
-    assert code(wrong) == 1
-    assert "NOT the objective that the file claims" in capsys.readouterr().out
