@@ -295,7 +295,8 @@ def _check_any(
     arrays = check_certificate.unpack_archive(data)
     head = check_certificate.refuse_damage(check_certificate.json_of)(arrays, "head")
     if head.get("format") == check_orthogonal.FORMAT:
-        proven: ProvenClaim = check_orthogonal.check_arrays(arrays)
+        memory = check_certificate.memory_for(len(data), check_orthogonal.MORE_ROOM)
+        proven: ProvenClaim = check_orthogonal.check_arrays(arrays, memory=memory)
     else:
         check_certificate.check_sizes(arrays, len(data))
         with _pass_function(arrays, jobs, progress) as pass_all:

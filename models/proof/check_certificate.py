@@ -125,10 +125,10 @@ def refuse_damage(work: Callable[..., Any]) -> Callable[..., Any]:
     """The function, which raises UnreadableError where damaged arrays let it fail."""
 
     @functools.wraps(work)
-    def guarded(*arguments: Any) -> Any:
+    def guarded(*arguments: Any, **named: Any) -> Any:
         try:
-            return work(*arguments)
-        except (ValueError, TypeError, KeyError, IndexError, OverflowError, RecursionError) as error:
+            return work(*arguments, **named)
+        except (ArithmeticError, LookupError, RecursionError, TypeError, ValueError) as error:
             raise UnreadableError(f"is damaged ({type(error).__name__}: {str(error)[:80]})") from error
 
     return guarded
@@ -159,8 +159,13 @@ def check_sizes(arrays: dict[str, Array], size: int) -> None:
 def check_names(arrays: dict[str, Array]) -> None:
     """Raise UnreadableError unless the arrays are exactly those of a certificate with that many levels."""
     head = head_of(arrays)
-    levels, names = level_count(head), set(PARTS) | (set() if norm_of(head) == 2 else {SLOPES})
-    names |= {f"level_{number}_{part}" for number in range(levels) for part in LEVEL_PARTS}
+    names = set(PARTS) | (set() if norm_of(head) == 2 else {SLOPES})
+    compare_names(arrays, names, LEVEL_PARTS, level_count(head))
+
+
+def compare_names(arrays: dict[str, Array], names: set[str], of_level: tuple[str, ...], levels: int) -> None:
+    """Raise UnreadableError unless these are the names of all arrays, with those of so many levels."""
+    names = names | {f"level_{number}_{part}" for number in range(levels) for part in of_level}
     for name in sorted(names - set(arrays)):
         raise UnreadableError(f"has no array {name}")
     for name in sorted(set(arrays) - names):
@@ -168,22 +173,37 @@ def check_names(arrays: dict[str, Array]) -> None:
 
 
 def check_memory(arrays: dict[str, Array], size: int) -> None:
-    """Raise UnreadableError unless a file of that size may take the memory that the check would take.
-
-    The bytes for each number are more than what the check was measured to take.
-    """
+    """Raise UnreadableError unless a file of that size may take the memory that the check would take."""
     mask, most = arrays["instance_mask"], 0
     for number in range(level_count(head_of(arrays))):
         at = f"level_{number}_"
-        counts = np.clip(take_array(arrays, f"{at}ranges", "<i4", None, 4)[:, 1::2], 0, MOST_COUNT).astype(
-            np.int64
-        )
-        labels, side = int(counts.prod(axis=1).sum()), int(counts.max(initial=0))
-        shares = arrays[f"{at}share_steps"].size
-        most = max(most, 16 * labels + 96 * shares + 96 * side * side + 32 * arrays[f"{at}table_steps"].size)
+        counts = take_array(arrays, f"{at}ranges", "<i4", None, 4)[:, 1::2]
+        stored = (arrays[f"{at}{part}_steps"].size for part in ("share", "table"))
+        most = max(most, level_memory(counts, *stored))
     most += 24 * mask.size + 1500 * int(mask.sum()) + sum(array.nbytes for array in arrays.values())
-    enough = most <= ROOM + MORE_ROOM * size
-    check_format(enough, f"takes {most >> 20} MB of memory to check, more than a file of its size may")
+    check_room(most, memory_for(size))
+
+
+def level_memory(counts: Array, shares: int, tables: int) -> int:
+    """Bytes that the pass over a level takes at most; more than was measured.
+
+    counts (n, 2): the numbers of alphas and betas of each pixel. shares, tables: how many numbers are stored.
+    """
+    counts = np.clip(counts, 0, MOST_COUNT).astype(np.int64)
+    labels, side = counts.prod(axis=1), int(counts.max(initial=0))
+    many = 16 * labels.sum() + 112 * labels.max(initial=0)
+    return int(many) + 96 * shares + 64 * side * side + 32 * tables
+
+
+def memory_for(size: int, each: int = MORE_ROOM) -> int:
+    """Bytes of memory that the check of a file of that many bytes may take. each: for each of these."""
+    return ROOM + each * size
+
+
+def check_room(memory: int, most: int) -> None:
+    """Raise UnreadableError unless a check takes at most so many bytes of memory."""
+    few = f"more than the {most >> 20} MB that a file of its size may"
+    check_format(memory <= most, f"takes {memory >> 20} MB of memory to check, {few}")
 
 
 def head_of(arrays: dict[str, Array], known: str = FORMAT, version: int = VERSION) -> dict[str, Any]:
@@ -229,7 +249,8 @@ def _object_with_unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def number_in(head: dict[str, Any], name: str, least: float, most: float) -> float:
     """A number of a JSON object, within limits."""
     value: Any = head.get(name)
-    require(type(value) in (int, float) and least <= value <= most, name, f"is not in [{least:g}, {most:g}]")
+    finite = type(value) in (int, float) and math.isfinite(value)
+    require(finite and least <= value <= most, name, f"is no number in [{least:g}, {most:g}]")
     return float(value)
 
 
@@ -336,6 +357,7 @@ def terms_of(arrays: dict[str, Array]) -> tuple[EnergyTerms, Array]:
     """The instance, with directions moved into the gauge's own range, and its stroke pixels."""
     head = json_of(arrays, "instance_head")
     require("instance_crossings" not in arrays, "instance_crossings", "is not covered by certificates")
+    require(head.get("orthogonal", False) is False, "orthogonal", "crosses are another problem")
     take_array(arrays, "instance_origin", "<f8", 2)  # not part of the proof, but of the instance
     white, first, second, at = pixels_of(arrays)
     theta, w = strokes_of(arrays, head, at)
@@ -1222,15 +1244,18 @@ def pass_levels(
     most = energy + error + slack
     combs = [True] * (count - 1) + [has_pieces]
     tasks = [(arrays_for(arrays, number), number, most, combs[number]) for number in range(count)]
-    bounds: list[float] = []
-    level, cells = level_of(arrays, 0, terms), list[Array]()
+    bounds, cells, passes = list[float](), list[Array](), iter(do_all(pass_level, tasks))
+    level = finer = level_of(arrays, 0, terms)
     check_whole_strip(level)
-    for number, (bound, left) in enumerate(do_all(pass_level, tasks)):
-        if number:
-            before, level = level, level_of(arrays, number, terms)
-            check_covered(before, cells, level, number)
+    for number in range(count):
+        if number:  # before the pass, which may take long
+            finer = level_of(arrays, number, terms)
+            check_covered(level, cells, finer, number)
+        passed = next(passes, None)
+        if passed is None:  # interrupted
+            break
+        level, (bound, cells) = finer, passed
         bounds.append(bound)
-        cells = left
     last = None
     if all(left.any() for left in cells):
         boxes = boxes_of(level, cells, 2 * (count + 1) * SLIVER)

@@ -30,16 +30,30 @@ FORMAT, VERSION = "crossfield-orthogonal-certificate", 2
 HALF, QUARTER, MARGIN = base.HALF, base.QUARTER, base.ROUNDING * base.PRECISION
 min_plus = base.min_plus_product
 RELATIVE = 1e-9
-FLAT = 1.1e-8  # radians; instances take smaller turns between frames as 0
+FLAT = 1e-8  # radians; instances take smaller turns between frames as 0
 MOST_LEVELS, MOST_DIVISIONS = 64, 10_000  # of a certificate; cells of a quarter turn
 STRIDE = 4 * MOST_DIVISIONS  # between keys of labels of two points
-MOST_COSTS = 1 << 27  # of two labels of all pairs of a level: some 10 GB
+MOST_MEMORY = 1 << 33  # bytes for a level, of whatever file
+MORE_ROOM = 1 << 11  # bytes of memory for each byte of a file: more than for other crosses
 MOST_RING = 64  # pairs of a ring
+MOST_TABLES = 1 << 22  # of a level: sums of so many 32-bit numbers are exact in 64-bit floats
+MOST_FORESTS = 8  # of a level
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
 MOST_CASES = 256  # of integers after the last level
-MOST_NUMBER = 1e6  # of a weight and of an angle
+MOST_ANGLE = 1e3  # of a centre and of the angles of a case
+FARTHEST, THINNEST = 1e30, 1e-12  # coordinates; height of a face relative to its longest edge
+DECIMALS = 12  # of kappa
 TURNS = np.arange(-3, 4)  # by which an integer may differ from that of the centre
 CENTRAL = TURNS == 0
+
+PARTS = (
+    "head", "instance_head", "instance_theta", "instance_w", "alpha", "p", "centre", "half", "ring_start",
+    "ring_pair", "ring_sign", "divisions", "cases",
+)  # fmt: skip
+OF_MESH = ("instance_vertices", "instance_faces", "instance_stroke_faces", "kappa")
+OF_GRID = ("instance_origin", "instance_mask", "instance_stroke_pixels")
+WEIGHTS = "instance_pair_weights"  # also, unless all are 1
+LEVEL_PARTS = ("rings", "shares", "unit", "forests", "squares")
 
 Array = Any
 Ring = tuple[list[int], list[int], list[int]]
@@ -55,23 +69,32 @@ class CentredRows:
     offset (r,): r = alpha_first - alpha_second + offset + pi/2 z. pairs: number of pairs. limit (r,): of
     Lemma 1. rings: of each ring, its pairs, 1 or -1 for their directions, and its points in order. centre
     (n + 1,): angles. nearest, residual (r,): integers of least energy there, and residuals. half (n + 1,): 1
-    where labels are shifted by half a step. fixed (n + 1,): points with the label 0 alone.
+    where labels are shifted by half a step. fixed (n + 1,): points with the label 0 alone. reach (r,): the
+    size of the numbers that make a residual of the centre. slack: by which the energies of all fields may be
+    less than here, because kappa differs from that of the mesh. memory, taken: most bytes for the check, and
+    those that it takes without levels.
     """
 
-    def __init__(self, arrays: dict[str, Array], limit: Array | None = None) -> None:
+    def __init__(
+        self, arrays: dict[str, Array], limit: Array | None = None, memory: int = MOST_MEMORY
+    ) -> None:
         """Read a certificate. limit: of Lemma 1, where it is known."""
+        self.memory, self.taken = min(memory, MOST_MEMORY), memory_of_instance(arrays)
+        base.check_room(self.taken, self.memory)
         head = base.json_of(arrays, "instance_head")
-        asked = {"gauge": "strokes", "orthogonal": True}
-        base.require([head.get(name) == asked[name] for name in asked], str([*asked]), "is another one")
+        base.require(head.get("gauge") == "strokes", "gauge", "is not 'strokes'")
+        base.require(head.get("orthogonal") is True, "orthogonal", "is not true")
         if "instance_faces" in arrays:
-            n, first, second, kappa, point = pairs_of_mesh(arrays)
+            n, first, second, kappa, point, wrong = pairs_of_mesh(arrays)
         else:
+            base.take_array(arrays, "instance_origin", "<f8", 2)  # not part of the proof, but of the instance
             white, first, second, point = base.pixels_of(arrays)
             n, kappa = len(white), np.zeros(len(first))
+            wrong = kappa
         m, weight = len(first), np.ones(len(first))
-        if "instance_pair_weights" in arrays:
-            weight = base.take_array(arrays, "instance_pair_weights", "<f8", m)
-        base.require((weight > 0) & (weight <= MOST_NUMBER), "pair_weights", "is not in (0, 1e6]")
+        if WEIGHTS in arrays:
+            weight = base.take_array(arrays, WEIGHTS, "<f8", m)
+        base.require((weight > 0) & (weight <= base.MOST_WEIGHT), WEIGHTS, "is not in (0, 1e6]")
         theta, of_strokes = base.strokes_of(arrays, head, point)
         self.size, self.pairs, self.first = n, m, np.concatenate([first, point])
         self.second = np.concatenate([second, np.full(len(point), n)])
@@ -79,8 +102,10 @@ class CentredRows:
         self.offset, self.weight = np.concatenate([kappa, -theta]), np.concatenate([2 * weight, of_strokes])
         self.rings, self.fixed = rings_of(arrays, first, second), self._fixed_points()
         self.limit = limits_of(self) if limit is None else limit
+        self.slack = math.fsum(self.weight[:m] * (HALF + wrong) * wrong)  # |r| is at most pi/4
         self.centre = np.append(base.take_array(arrays, "centre", "<f8", n), 0.0)
-        base.require(np.abs(self.centre) <= MOST_NUMBER, "centre", "is too large")
+        base.require(np.abs(self.centre) <= MOST_ANGLE, "centre", "is too large")
+        self.reach = self.reach_of(self.centre)
         self.half = np.append(base.take_array(arrays, "half", "|u1", n), 0).astype(np.int64)
         base.require(self.half <= np.where(self.fixed, 0, 1), "half", "is not 0, or 1 at a point not fixed")
         self.nearest = np.round(-self.residuals(self.centre) / HALF)
@@ -89,6 +114,10 @@ class CentredRows:
     def residuals(self, angle: Array) -> Array:
         """Residuals of all rows at z = 0; angle (n + 1,), 0 at the ground."""
         return angle[self.first] - angle[self.second] + self.offset
+
+    def reach_of(self, angle: Array) -> Array:
+        """The size of the numbers in these residuals."""
+        return np.abs(angle[self.first]) + np.abs(angle[self.second]) + np.abs(self.offset)
 
     def _fixed_points(self) -> Array:
         """The ground and the first point of each part that no row of weight joins to it."""
@@ -102,12 +131,22 @@ class CentredRows:
         return np.asarray(part == number)
 
 
-def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, Array]:
-    """Number of faces, pairs that share an edge, their kappa, and stroke faces."""
+def memory_of_instance(arrays: dict[str, Array]) -> int:
+    """Bytes that the check takes at most without levels; more than was measured."""
+    mask = arrays.get("instance_mask", np.zeros(0, bool))
+    size = len(arrays["instance_faces"]) if "instance_faces" in arrays else int(mask.sum())
+    dense = 36 * size * size if size <= MOST_DENSE else 0
+    return int(24 * mask.size + 1500 * size + dense + 8 * sum(array.nbytes for array in arrays.values()))
+
+
+def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, Array, Array]:
+    """Number of faces, pairs that share an edge, their kappa, stroke faces, and errors of kappa."""
     vertices = base.take_array(arrays, "instance_vertices", "<f8", None, 3)
     faces = base.take_array(arrays, "instance_faces", "<i4", None, 3).astype(np.int64)
     point = base.take_array(arrays, "instance_stroke_faces", "<i4", None).astype(np.int64)
     n, v = len(faces), len(vertices)
+    base.require(n > 0, "faces", "are none")
+    base.require(np.abs(vertices) <= FARTHEST, "vertices", "is too far away")
     base.require((faces >= 0) & (faces < v), "faces", "names no vertex")
     base.require((point >= 0) & (point < n), "stroke_faces", "is no face")
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -116,30 +155,39 @@ def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, A
     opposite = np.array([edge_of.get(key, -1) for key in (end * v + start).tolist()], np.int64)
     edge = np.nonzero((opposite >= 0) & (start < end))[0]
     ends = edge // 3, opposite[edge] // 3
-    corner = vertices[faces]
-    x = corner[:, 1] - corner[:, 0]  # the axis of the frame
-    z = np.cross(x, corner[:, 2] - corner[:, 0])
-    y = np.cross(z, x) / np.linalg.norm(z, axis=1)[:, None]  # as long as x
-    along = vertices[end[edge]] - vertices[start[edge]]
+    side = np.roll(vertices[faces], -1, axis=1) - vertices[faces]
+    longest = np.abs(side).max(axis=(1, 2))
+    base.require(longest > 0, "faces", "has no area")
+    side /= longest[:, None, None]  # whatever the scale, nothing overflows or vanishes
+    x, z = side[:, 0], np.cross(side[:, 0], -side[:, 2])  # the axis of the frame, and a normal
+    area = np.linalg.norm(z, axis=1)
+    base.require(area > THINNEST * (side * side).sum(axis=2).max(axis=1), "faces", "has no area")
+    y = np.cross(z, x) / area[:, None]  # as long as x
+    along = side.reshape(-1, 3)[edge]
     one, other = (np.arctan2((y[f] * along).sum(axis=1), (x[f] * along).sum(axis=1)) for f in ends)
+    turn = np.round(np.remainder(other - one + np.pi, 2 * np.pi) - np.pi, DECIMALS)
     kappa = base.take_array(arrays, "kappa", "<f8", len(edge))
-    wrong = np.abs(np.remainder(other - one - kappa + np.pi, 2 * np.pi) - np.pi)
-    base.require(wrong < FLAT, "kappa", "is not that of the mesh")
-    return n, *ends, kappa, point
+    wrong = np.abs(kappa - np.where(np.abs(turn) < FLAT, 0.0, turn))
+    wrong = np.minimum(wrong, np.abs(wrong - 2 * np.pi))
+    base.require((np.abs(kappa) <= 4) & (wrong < 1.1 * 10.0**-DECIMALS), "kappa", "is not that of the mesh")
+    return n, *ends, kappa, point, wrong
 
 
 def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring]:
-    """The rings: closed walks over different points. first, second (m,): the ends of pairs."""
-    start = base.take_array(arrays, "ring_start", "<i4", None)
-    base.require(np.diff(start) <= MOST_RING, "ring_start", "has too long a ring")
+    """The rings: closed walks over different points and pairs. first, second (m,): the ends of pairs."""
+    start = base.take_array(arrays, "ring_start", "<i4", None).astype(np.int64)
+    base.require(len(start) and start[0] == 0, "ring_start", "does not begin with 0")
+    steps = np.diff(start)
+    base.require((steps >= 2) & (steps <= MOST_RING), "ring_start", "has too short or too long a ring")
     pair = base.take_array(arrays, "ring_pair", "<i4", int(start[-1]))
     sign = base.take_array(arrays, "ring_sign", "|i1", int(start[-1]))
     base.require((pair >= 0) & (pair < len(first)) & (np.abs(sign) == 1), "ring_pair", "is no pair")
     begin, end = np.where(sign > 0, [first[pair], second[pair]], [second[pair], first[pair]])
     rings: list[Ring] = []
     for a, b in zip(start[:-1].tolist(), start[1:].tolist()):
-        closed = (np.roll(begin[a:b], -1) == end[a:b]).all() and len(set(begin[a:b].tolist())) == b - a
-        base.require(closed, f"ring {len(rings)}", "is no closed walk over different points")
+        differ = all(len(set(part[a:b].tolist())) == b - a for part in (begin, pair))
+        closed = (np.roll(begin[a:b], -1) == end[a:b]).all() and differ
+        base.require(closed, f"ring {len(rings)}", "is no closed walk over different points and pairs")
         rings.append((pair[a:b].tolist(), sign[a:b].tolist(), begin[a:b].tolist()))
     return rings
 
@@ -148,7 +196,7 @@ def limits_of(rows: CentredRows) -> Array:
     """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,)."""
     n, first, second, weight = rows.size, rows.first, rows.second, rows.weight
     if n > MOST_DENSE:
-        return np.full(len(first), QUARTER)
+        return np.full(len(first), QUARTER + RELATIVE)
     matrix = np.zeros((n + 1, n + 1))
     np.add.at(matrix, (first, second), weight)
     degree = (matrix := matrix + matrix.T).sum(axis=1)
@@ -163,6 +211,15 @@ def limits_of(rows: CentredRows) -> Array:
 
 
 # Section 2: labels, cells and costs ------------------------------------------------------------------------
+
+
+def level_memory(rows: CentredRows, counts: Array) -> int:
+    """Bytes that the check takes at most with a level; more than was measured.
+
+    counts (n + 1,): the numbers of cells of all points.
+    """
+    counts = np.asarray(counts, np.float64) + 1
+    return rows.taken + int(80 * (counts[rows.first] @ counts[rows.second]) + 100 * counts.sum())
 
 
 def starts_of(sizes: Array) -> Array:
@@ -186,8 +243,8 @@ class RowTable:
     def __init__(self, rows: CentredRows, point: Array) -> None:
         count = np.bincount(point, minlength=rows.size + 1)
         self.start, height, self.width = starts_of(count), count[rows.first], count[rows.second]
-        fits = (count > 0).all() and np.sum((height + 1) * (self.width + 1)) <= MOST_COSTS
-        base.require(fits, "the level", "has too many labels, or a point with none")
+        base.require(count > 0, "the level", "leaves a point no label")
+        base.check_room(level_memory(rows, count), rows.memory)
         self.begin = starts_of(height * self.width)
         self.row = np.repeat(np.arange(len(height), dtype=np.int32), height * self.width)
         self.item = spans(self.start[rows.first], height), spans(self.start[rows.second], self.width)
@@ -248,6 +305,7 @@ class CellLevel:
 def first_level(rows: CentredRows, divisions: int) -> CellLevel:
     """All crosses: cells that span a quarter turn; label 0 alone where a point is fixed."""
     count = np.where(rows.fixed, 1, divisions)
+    base.check_room(level_memory(rows, count), rows.memory)
     lowest = np.where(rows.fixed, 0, -((divisions + rows.half) // 2))
     return CellLevel(rows, divisions, np.repeat(np.arange(len(count)), count), spans(lowest, count))
 
@@ -294,22 +352,29 @@ class Excess:
     steps, and the least sum of -tables. error: of all sums together.
     """
 
-    def __init__(self, level: CellLevel, costs: Array, shares: Array, rings: list[Any]) -> None:
-        """shares: of each label of the first points of pairs. rings: rings, and the tables of their steps."""
-        pairs, of_strokes = level.pairs, costs[level.pairs.begin[level.rows.pairs] :]
-        shares = np.append(shares, np.where(np.isfinite(of_strokes), of_strokes, 0.0))
-        self.level, self.pairs = level, costs.copy()
+    def __init__(self, level: CellLevel, costs: Array, unit: float, shares: Array, rings: list[Any]) -> None:
+        """shares: of each label of the first points of pairs. rings: rings, and the tables of their steps.
+
+        Both are whole multiples of the unit, so that tables of one pair have an exact sum.
+        """
+        rows, pairs, of_strokes = level.rows, level.pairs, costs[level.pairs.begin[level.rows.pairs] :]
+        shares = np.append(shares * unit, np.where(np.isfinite(of_strokes), of_strokes, 0.0))
+        self.level, self.pairs = level, np.zeros_like(costs)
         for ring, tables in rings:
             for e, table in zip(ring[0], tables):
                 pairs.matrix(self.pairs, e)[:] += table
+        self.pairs *= unit
+        self.pairs += costs
         self.pairs -= shares[pairs.line[0]]
-        size = 2 * greatest(self.pairs, pairs.begin) + 2 * greatest(shares, pairs.first_line)
+        size = greatest(costs, pairs.begin) + rows.weight * (1 + rows.reach) / 8
+        size += 2 * greatest(self.pairs, pairs.begin) + 2 * greatest(shares, pairs.first_line)
         rest = np.full(len(pairs.item[1]), np.inf)  # the greatest shares of the second points
         np.minimum.at(rest, pairs.line[1], self.pairs)
         self.pairs -= np.where(np.isfinite(rest), rest, 0.0)[pairs.line[1]]
         points = np.where(pairs.have_partners(np.isfinite(costs)), 0.0, np.inf)
         np.add.at(points, pairs.item[0], shares)
         np.add.at(points, pairs.item[1], rest)
+        rings = [(ring, [table * unit for table in tables]) for ring, tables in rings]
         self.rings = [(*ring, self._ring_least(*ring)) for ring in rings]
         least = np.append(np.minimum.reduceat(points, pairs.start[:-1]), [ring[2] for ring in self.rings])
         base.require(np.isfinite(least), "the level", "leaves not even the field")
@@ -318,6 +383,7 @@ class Excess:
         of_tables = [3 * np.abs(table).max() for _, tables in rings for table in tables]
         self.error = MARGIN * math.fsum([*size, *of_tables])
         self.bound = math.fsum(least) - self.error
+        base.require(math.isfinite(self.bound), "the level", "has no finite bound")
 
     def _along(self, ring: Ring, tables: list[Array], combine: Any) -> list[Array]:
         """Pairs combined with tables, step after step along a ring."""
@@ -340,8 +406,11 @@ class Excess:
         marginals = zip([steps[0] + after[0].T, *middle, steps[-1] + before[-1].T], ring[1])
         return [(marginal if sign > 0 else marginal.T) - least for marginal, sign in marginals]
 
-    def forest_marginals(self, forest: list[int]) -> Array:
-        """Of each label, the least sum of excesses on a forest; the pairs of a tree grow from one of them."""
+    def forest_marginals(self, forest: list[int], spare: float) -> Array:
+        """Of each label, the least sum of excesses on a forest; the pairs of a tree grow from one of them.
+
+        Labels with a sum above `spare` are excluded on the way. So no difference of great numbers is taken.
+        """
         edges, reached, pairs = list[tuple[int, int, Array]](), set[int](), self.level.pairs
         up, message = list(self.by_point), dict[int, Array]()
         for e in forest:
@@ -356,7 +425,8 @@ class Excess:
             up[parent] = up[parent] + message[i]
         whole = list(up)
         for i, parent, matrix in edges:
-            rest = whole[parent] - np.where(np.isfinite(message[i]), message[i], 0.0)  # without i; inf stays
+            rest = np.full(len(whole[parent]), np.inf)  # without i
+            np.subtract(whole[parent], message[i], out=rest, where=whole[parent] <= spare)
             whole[i] = up[i] + (matrix + rest).min(axis=1)
         return np.concatenate(whole)
 
@@ -369,7 +439,7 @@ def greatest(numbers: Array, start: Array) -> Array:
 def kept_of(level: CellLevel, excess: Excess, forests: Array, most: float) -> Array:
     """Lemma 4: the squares that an optimal field of energy `most` or less may use."""
     spare = (most - excess.bound + 2 * excess.error) * (1 + RELATIVE)
-    marginals = [excess.forest_marginals(forest.tolist()) for forest in forests]
+    marginals = [excess.forest_marginals(forest.tolist(), spare) for forest in forests]
     labels = np.maximum.reduce([excess.points, *marginals]) <= spare
     pairs = np.add(*level.pairs.at_ends(np.where(labels, excess.points, np.inf))) + excess.pairs <= spare
     labels &= level.pairs.have_partners(pairs)
@@ -413,27 +483,32 @@ def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
         force = 2 * rows.weight * r
         slope = np.bincount(rows.first, force, rows.size + 1) - np.bincount(rows.second, force, rows.size + 1)
         away = np.abs(angle - rows.centre) + np.where(rows.fixed, 0.0, np.pi)
-        size = float(np.sum(rows.weight * (1 + r * r) * (1 + np.abs(angle[rows.first])))) * (1 + away.max())
-        bounds.append(math.fsum(rows.weight * r * r) - math.fsum(np.abs(slope) * away) - MARGIN * size)
-    return float(min(bounds))
+        size = np.sum(rows.weight * (1 + r * r) * (1 + rows.reach_of(angle))) / 4 * (1 + away.max())
+        bounds.append(math.fsum(rows.weight * r * r) - math.fsum(np.abs(slope) * away) - MARGIN * float(size))
+    return min(bounds)
 
 
 # The theorem -----------------------------------------------------------------------------------------------
 
 
 @base.refuse_damage
-def check_arrays(arrays: dict[str, Array], limit: Array | None = None) -> base.ProvenClaim:
-    """Check the arrays of a certificate and return what they prove. limit: of Lemma 1, where it is known.
+def check_arrays(
+    arrays: dict[str, Array], limit: Array | None = None, memory: int = MOST_MEMORY
+) -> base.ProvenClaim:
+    """Check the arrays of a certificate and return what they prove.
 
-    Raises NotProvenError when a level does not follow from the one before, or when less is proven than
-    claimed, and UnreadableError for arrays that are not a certificate.
+    limit: of Lemma 1, where it is known. memory: most bytes for the check. Raises NotProvenError when a level
+    does not follow from the one before, or when less is proven than claimed, and UnreadableError for arrays
+    that are not a certificate.
     """
-    head, rows = base.head_of(arrays, FORMAT, VERSION), CentredRows(arrays, limit)
-    energy, error = energy_of(arrays, rows)
-    threshold = base.number_in(head, "threshold", energy + error, math.inf)
+    head = base.head_of(arrays, FORMAT, VERSION)
     divisions = base.take_array(arrays, "divisions", "<i4", None).tolist()
-    fits = len(divisions) <= MOST_LEVELS and divisions[0] >= 3 and max(divisions) <= MOST_DIVISIONS
+    check_names(arrays, len(divisions))
+    fits = 0 < len(divisions) <= MOST_LEVELS and divisions[0] >= 3 and max(divisions) <= MOST_DIVISIONS
     base.require(fits, "divisions", "is out of range")
+    rows = CentredRows(arrays, limit, memory)
+    energy, error, same = energy_of(arrays, rows)
+    threshold = base.number_in(head, "threshold", energy + error, math.inf)
     level, bounds, squares = first_level(rows, divisions[0]), list[float](), np.zeros(0, bool)
     for number, count in enumerate(divisions):
         if number:
@@ -447,44 +522,67 @@ def check_arrays(arrays: dict[str, Array], limit: Array | None = None) -> base.P
         excess = Excess(level, costs_of(level), *stored_shares(arrays, number, level))
         bounds.append(excess.bound)
         forests = base.take_array(arrays, f"level_{number}_forests", "<i4", None, None)
-        base.require((forests >= 0).all() and (forests < rows.pairs).all(), "forests", "names no pair")
+        base.require(len(forests) <= MOST_FORESTS, "forests", "are too many")
+        base.require((forests >= 0) & (forests < rows.pairs), "forests", "names no pair")
         squares = kept_of(level, excess, forests, threshold)
     turns = possible_turns(level, squares)
     angles = base.take_array(arrays, "cases", "<f8", None, rows.size)
-    base.require(np.abs(angles).max(initial=0.0) <= MOST_NUMBER, "cases", "is too large")
-    proven = max(0.0, min(max(*bounds, cases_bound(rows, turns, angles)), energy - error))
+    base.require(np.abs(angles) <= MOST_ANGLE, "cases", "is too large")
+    least = max(*bounds, cases_bound(rows, turns, angles))
+    proven = max(0.0, min(least, energy - error) - rows.slack)
     bound = max(0.0, proven - base.SPARE * (1 + proven))
-    status, forced = base.status_of(energy, bound), (turns[: rows.pairs] == CENTRAL).all(axis=1)
+    status, forced = base.status_of(energy, bound), (turns[: rows.pairs] == CENTRAL).all(axis=1) & same
     claim = base.ProvenClaim(status, 2, energy, bound, forced, bounds)
     base.check_claim(head, claim, proven, error)
     return claim
 
 
-def energy_of(arrays: dict[str, Array], rows: CentredRows) -> tuple[float, float]:
-    """The energy of the field, and the greatest error of that number."""
+def check_names(arrays: dict[str, Array], levels: int) -> None:
+    """Raise UnreadableError unless the arrays are exactly those of a certificate with so many levels."""
+    of_domain = OF_MESH if "instance_faces" in arrays else OF_GRID
+    base.compare_names(arrays, {*PARTS, *of_domain} | ({WEIGHTS} & arrays.keys()), LEVEL_PARTS, levels)
+
+
+def check_bytes(data: bytes) -> base.ProvenClaim:
+    """Check the bytes of a certificate. Raises as `check_arrays`."""
+    memory = base.memory_for(len(data), MORE_ROOM)
+    return check_arrays(base.unpack_archive(data), memory=memory)  # type: ignore[no-any-return]
+
+
+def energy_of(arrays: dict[str, Array], rows: CentredRows) -> tuple[float, float, Array]:
+    """The energy of the field, the greatest error of that number, and which jumps are the centre's (m,).
+
+    For the latter, crosses take the labels that are nearest to the centre.
+    """
     m, lower = rows.pairs, np.zeros(rows.size)
     alpha, p = base.take_array(arrays, "alpha", "<f8", rows.size), base.take_array(arrays, "p", "<i4", m)
     lower[rows.first[m:]] = -rows.offset[m:] - QUARTER
     inside = (alpha >= lower - RELATIVE) & (alpha <= lower + HALF + RELATIVE)
     base.require(inside, "alpha", "is outside its window")
+    p = p.astype(np.int64)
+    base.require(np.abs(p) <= base.MOST_JUMP, "p", "is no jump")
     r = rows.residuals(np.append(alpha, 0.0))
     r[:m] += HALF * p
-    return math.fsum(rows.weight * r * r), MARGIN * float(np.sum(rows.weight * (1 + r * r)))
+    turns = np.round((rows.centre[:-1] - alpha) / HALF)
+    same = p - turns[rows.first[:m]] + turns[rows.second[:m]] == rows.nearest[:m]
+    return math.fsum(rows.weight * r * r), MARGIN * float(np.sum(rows.weight * (1 + r * r))), same
 
 
-def stored_shares(arrays: dict[str, Array], number: int, level: CellLevel) -> tuple[Array, list[Any]]:
-    """The shares of pairs, and rings with tables, of a level as the certificate states them."""
+def stored_shares(arrays: dict[str, Array], number: int, level: CellLevel) -> tuple[float, Array, list[Any]]:
+    """The unit of a level, and in it the shares of pairs, and rings with tables, as stored."""
     unit = base.take_array(arrays, f"level_{number}_unit", "<f8", 1)
     base.require((unit >= 0) & (unit <= 1), f"level_{number}_unit", "is not in [0, 1]")
-    numbers = base.take_array(arrays, f"level_{number}_rings", "<i4", None)
+    numbers, name = base.take_array(arrays, f"level_{number}_rings", "<i4", None), f"level_{number}_rings"
+    base.require((numbers >= 0) & (numbers < len(level.rows.rings)), name, "is no ring")
     pairs, rings = level.pairs, [level.rows.rings[ring] for ring in numbers]
     steps = [e for ring in rings for e in ring[0]]
+    base.require(len(steps) <= MOST_TABLES, name, "has too many tables")
     ends = pairs.first_line[level.rows.pairs] + starts_of(np.diff(pairs.begin)[steps])
     multiples = base.take_array(arrays, f"level_{number}_shares", "<i4", int(ends[-1]))
-    shares, *blocks = np.split(multiples * unit, ends[:-1])
+    shares, *blocks = np.split(multiples.astype(np.float64), ends[:-1])
     tables = iter([block.reshape(-1, pairs.width[e]) for block, e in zip(blocks, steps)])
-    return shares, [(ring, [next(tables) for _ in ring[0]]) for ring in rings]
+    return float(unit[0]), shares, [(ring, [next(tables) for _ in ring[0]]) for ring in rings]
 
 
 if __name__ == "__main__":
-    sys.exit(base.main(sys.argv[1:], lambda data: check_arrays(base.unpack_archive(data))))
+    sys.exit(base.main(sys.argv[1:], check_bytes))

@@ -214,7 +214,7 @@ class _Prover:
         best = field_of(self.instance, self.z, self.energy)
         arrays = self.arrays | {"centre": self.energy.fit_angles(self.z), "divisions": np.zeros(0, np.int32)}
         rows = checker.CentredRows(arrays, self.limit)
-        energy, error = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
+        energy, error, _ = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
         return _CentredLevels(rows, energy * (1 + _BETTER) + 2 * error, arrays)
 
     def _ascend(self, dual: RingDual, chain: _CentredLevels, ahead: float) -> bool:

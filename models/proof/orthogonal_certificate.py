@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..array_archive import Arrays
+from ..array_archive import Arrays, pack_arrays
 from ..field.field import Norm
 from ..instance.domain import Floats
 from . import check_orthogonal as checker
-from .check_certificate import ProvenClaim
+from .check_certificate import ProvenClaim, memory_for
 from .record import Claim
 
 
@@ -64,6 +64,7 @@ def check_proof(proof: OrthogonalProof, limit: Floats | None = None) -> Orthogon
 
     Raises NotProvenError or UnreadableError for a proof that does not hold.
     """
-    proven = checker.check_arrays(replace(proof, bound=0.0).certificate(), limit)
+    arrays = replace(proof, bound=0.0).certificate()
+    proven = checker.check_arrays(arrays, limit, memory_for(len(pack_arrays(arrays)), checker.MORE_ROOM))
     ended = "optimal" if proven.status == "optimal" else proof.ended
     return replace(proof, bound=proven.bound, forced=proven.forced, ended=ended, proven=proven)

@@ -1,5 +1,6 @@
 """Memory that the checker of certificates takes: no more than the size of a file justifies."""
 
+import json
 import subprocess
 import sys
 
@@ -7,32 +8,39 @@ import numpy as np
 import pytest
 from crossfield.models.array_archive import pack_arrays
 from crossfield.models.errors import InputError
-from crossfield.models.proof import check_certificate
+from crossfield.models.instance.instance import Instance
+from crossfield.models.proof import check_certificate, check_orthogonal
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from exhaustive import optimum, random_instance, sketch
+from orthogonal_certificates import certificate_at
 from proofs_round_fields import prove_round
 
-pytest.importorskip("resource")  # of POSIX
+if not sys.platform.startswith("linux"):
+    pytest.skip("needs /proc", allow_module_level=True)
+
+TWO_GB = 2 << 30
 
 MEASURED = f"""
 import resource, sys
-import {check_certificate.__name__} as program
-limit, *given = sys.argv[1:]
-before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+import {check_certificate.__name__} as base, {check_orthogonal.__name__} as orthogonal
+def peak():
+    return int(open("/proc/self/status").read().split("VmHWM:")[1].split()[0]) * 1024
+limit, checker, *given = sys.argv[1:]
+before = peak()
 if int(limit):
     now = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (now + int(limit), now + int(limit)))
-code = program.main(given)
-print(code, (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024)
+code = base.main(given, {{"base": base, "orthogonal": orthogonal}}[checker].check_bytes)
+print(code, peak() - before)
 """
 
 
-def checked(path, limit=0):
-    """Output and exit code of the checker in a process of its own, and the memory that it took.
+def checked(path, limit=0, checker="base"):
+    """Output and exit code of a checker in a process of its own, and the memory that it took.
 
     limit: of the address space, beyond what the process has before; 0 for none.
     """
-    command = [sys.executable, "-c", MEASURED, str(limit), str(path)]
+    command = [sys.executable, "-c", MEASURED, str(limit), checker, str(path)]
     *text, last = subprocess.run(command, capture_output=True, text=True, check=True).stdout.splitlines()
     return "\n".join(text), *map(int, last.split())
 
@@ -73,12 +81,80 @@ def test_a_small_file_cannot_ask_for_much_memory(arrays, tmp_path):
     }.items():
         path.write_bytes(pack_arrays(forged))
         size = path.stat().st_size
-        text, code, memory = checked(path)
+        text, code, memory = checked(path, TWO_GB)
         assert (code, size < 500_000) == (2, True), (name, text)
         assert "a file of its size may" in text, name
         assert memory <= check_certificate.ROOM + check_certificate.MORE_ROOM * size, name
-        with pytest.raises(InputError, match=r"more than a file of its size may|larger arrays than"):
+        with pytest.raises(InputError, match="a file of its size may"):
             read_certificate(path)
+
+
+def test_a_level_takes_no_more_memory_than_is_allowed(arrays, tmp_path):
+    path, most = tmp_path / "it.npz", 1400
+    for name, forged in {
+        "one pixel": with_labels(arrays[False], most, most // 2),
+        "alphas": with_labels(arrays[True], 800, 160),
+        "betas": with_labels(arrays[True], 160, 700),
+        "both": with_labels(arrays[True], 500, 500),
+    }.items():
+        counts = forged["level_0_ranges"][:, 1::2]
+        spacing = {"level_0_h": np.array([np.pi / 2 / (counts.min() - 8)])}
+        path.write_bytes(pack_arrays(forged | spacing))
+        text, code, memory = checked(path, TWO_GB)
+        allowed = check_certificate.level_memory(counts, forged["level_0_share_steps"].size, 0)
+        assert code == 0, (name, text)
+        assert memory <= allowed + (20 << 20), name
+
+
+def test_a_level_that_covers_too_little_is_refused_before_its_pass(arrays, tmp_path, monkeypatch):
+    coarse, fine = arrays[True], with_labels(arrays[True], 300, 300)
+    head = json.loads(coarse["head"].tobytes()) | {"levels": 2}
+    forged = {name.replace("level_0", "level_1"): array for name, array in fine.items()} | coarse
+    forged |= {"head": np.frombuffer(json.dumps(head).encode(), np.uint8)}
+    passes, complete = [], check_certificate.pass_level
+    monkeypatch.setattr(check_certificate, "pass_level", lambda task: passes.append(task) or complete(task))
+    with pytest.raises(check_certificate.NotProvenError, match="level_1_h"):
+        check_certificate.check_arrays(forged)
+    assert len(passes) == 1
+
+
+def orthogonal_pixels(count, divisions):
+    """Arrays of a certificate of some pixels in a row, with a level of so many cells and shares of 0."""
+    mask, at = np.ones((1, count), bool), np.zeros((1, 2), int)
+    instance = Instance.on_pixels("row", mask, at, np.array([0.3]), np.ones(1), orthogonal=True)
+    arrays, pairs = certificate_at(instance, np.zeros(count, int), 3), count - 1
+    return arrays | {
+        "divisions": np.array([divisions], np.int32),
+        "level_0_shares": np.zeros(pairs * (divisions + 1), np.int32),
+        "level_0_squares": np.zeros(0, np.uint8),  # not read of the last level
+    }
+
+
+@pytest.mark.parametrize("count, divisions", [(2, 10_000), (2, 3000), (5000, 3), (200_000, 3)])
+def test_a_small_orthogonal_certificate_cannot_ask_for_much_memory(count, divisions, tmp_path):
+    path = tmp_path / "it.npz"
+    arrays = orthogonal_pixels(2, divisions) if count == 2 else orthogonal_pixels(2, 3)
+    if count > 2:
+        arrays |= {"instance_mask": np.ones((count // 100, 100), bool)}
+    path.write_bytes(pack_arrays(arrays))
+    size = path.stat().st_size
+    text, code, memory = checked(path, TWO_GB, "orthogonal")
+    assert (code, size < 50_000) == (2, True), text
+    assert memory <= check_certificate.memory_for(size, check_orthogonal.MORE_ROOM)
+    with pytest.raises(InputError, match="a file of its size may"):
+        read_certificate(path)
+
+
+@pytest.mark.parametrize("count, divisions", [(2, 1200), (60, 100), (1500, 15)])
+def test_an_orthogonal_level_takes_no_more_memory_than_is_allowed(count, divisions, tmp_path):
+    path = tmp_path / "it.npz"
+    arrays = orthogonal_pixels(count, divisions)
+    path.write_bytes(pack_arrays(arrays))
+    text, code, memory = checked(path, TWO_GB, "orthogonal")
+    counts = np.append(np.full(count, divisions), 1)
+    allowed = check_orthogonal.level_memory(check_orthogonal.CentredRows(arrays), counts)
+    assert code == 0, text
+    assert memory <= allowed + (20 << 20)
 
 
 def test_too_little_memory_is_no_damage(arrays, tmp_path):

@@ -101,7 +101,7 @@ def test_partial_sums_on_rings_that_are_cut_off_lose_the_optimum(monkeypatch):
 def test_a_single_pair_of_labels_is_kept_with_its_square():
     # a cross between two labels is rounded to both, so one that may stay keeps all squares that it touches
     ends = {"first": np.array([0]), "second": np.array([1])}
-    rows = SimpleNamespace(size=2, fixed=np.array([False, False, True]), **ends)
+    rows = SimpleNamespace(size=2, fixed=np.array([False, False, True]), memory=1 << 20, taken=0, **ends)
     level = checker.CellLevel(rows, 3, np.repeat([0, 1, 2], [3, 3, 1]), np.array([0, 1, 2, 0, 1, 2, 0]))
     corners = np.array(list(level.corners())).reshape(4, 3, 3)
     places = np.argwhere((corners == 4 * 1 + 2).any(axis=0))
