@@ -166,8 +166,8 @@ def _pass_function(arrays: Arrays, jobs: int, progress: Progress) -> Iterator[Ca
         def pass_all(work: Callable[..., Any], tasks: list[Any]) -> Iterator[Any]:
             passes = map(work, tasks) if processes == 1 else pool.map(work, tasks)
             for number, level_pass in enumerate(passes, 1):
-                yield level_pass
                 progress(f"checked {number} of {len(tasks)} levels")
+                yield level_pass
 
         yield pass_all
 

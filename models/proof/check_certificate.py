@@ -250,7 +250,7 @@ def number_in(head: dict[str, Any], name: str, least: float, most: float) -> flo
     """A number of a JSON object, within limits."""
     value: Any = head.get(name)
     finite = type(value) in (int, float) and math.isfinite(value)
-    require(finite and least <= value <= most, name, f"is no number in [{least:g}, {most:g}]")
+    require(finite and least <= value <= most, name, f"is not in [{least:g}, {most:g}]")
     return float(value)
 
 
