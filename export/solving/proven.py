@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 _ENDED: Final = {
     "time": "the time limit ended before a bound was proven; increase it",
-    "interrupted": "the proof was interrupted before a bound was proven",
+    "interrupted": "the proof was interrupted before its check confirmed a bound",
     "work": "the limit of work ended before a bound was proven; increase it",
     "gap": "the requested gap allows the bound 0; request a smaller one",
     "labels": "the next level would have too many labels",

@@ -356,7 +356,6 @@ def parity_sign(p: Array) -> Array:
 def terms_of(arrays: dict[str, Array]) -> tuple[EnergyTerms, Array]:
     """The instance, with directions moved into the gauge's own range, and its stroke pixels."""
     head = json_of(arrays, "instance_head")
-    require("instance_crossings" not in arrays, "instance_crossings", "is not covered by certificates")
     require(head.get("orthogonal", False) is False, "orthogonal", "crosses are another problem")
     take_array(arrays, "instance_origin", "<f8", 2)  # not part of the proof, but of the instance
     white, first, second, at = pixels_of(arrays)
@@ -562,6 +561,7 @@ def quads_of(arrays: dict[str, Array], at: str, terms: EnergyTerms, sides: Array
     lower_left = take_array(arrays, f"{at}quads", "<i4", None)
     require((lower_left >= 0) & (lower_left < len(sides)), f"{at}quads", "is no pixel")
     require(np.diff(lower_left) > 0, f"{at}quads", "is out of order")
+    require(terms.norm == 2 or not len(lower_left), f"{at}quads", "needs the norm 2")
     pair_of = {ends: e for e, ends in enumerate(zip(terms.first.tolist(), terms.second.tolist()))}
     upper = {i: j for i, j in pair_of if j < i}
     right = {i: j for i, j in pair_of if j > i}
@@ -1201,6 +1201,7 @@ def check_arrays(arrays: dict[str, Array], do_all: Callable[..., Any] = map) -> 
     do_all: as of `pass_levels`. Raises NotProvenError when a level does not follow from the one before, or
     when less is proven than claimed, and UnreadableError for arrays that are not a certificate.
     """
+    check_names(arrays)
     has_pieces = len(take_array(arrays, "cuts", "<i4", None)) > 0
     return check_last_step(arrays, pass_levels(arrays, do_all, has_pieces=has_pieces))
 

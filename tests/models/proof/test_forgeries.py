@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import zipfile
 from collections import Counter
 from dataclasses import replace
@@ -209,3 +210,86 @@ def test_every_array_twice_renamed_or_left_out_is_refused(honest, tmp_path, subt
             with subtests.test(member=member, what=forgery):
                 other.write_bytes(left_out if forgery == "left out" else files[forgery](data))
                 assert_refused(other)
+
+
+def with_entry(name, at, value):
+    """A function that returns arrays with one entry of an array changed."""
+
+    def change(arrays):
+        array = arrays[name].copy()
+        array.reshape(-1)[at] = value
+        return arrays | {name: array}
+
+    return change
+
+
+def of_instance(**changes):
+    """A function that returns arrays with other keys in the head of the instance."""
+    return lambda arrays: with_head(arrays, "instance_head", **changes)
+
+
+BROKEN = {
+    "orthogonal crosses": (of_instance(orthogonal=True), "orthogonal"),
+    "1 for true": (of_instance(orthogonal=1), "orthogonal"),
+    "weights of pairs": (
+        lambda a: a | {"instance_pair_weights": np.ones(4)},
+        "instance_pair_weights too many",
+    ),
+    "an unknown gauge": (of_instance(gauge="none"), "gauge"),
+    "a skew weight below 0": (of_instance(w_beta=-1e-9), "w_beta"),
+    "a skew weight that is no number": (of_instance(w_beta=np.nan), "w_beta"),
+    "an infinite weight of strokes": (of_instance(w_strokes=np.inf), "w_strokes"),
+    "true for a weight": (of_instance(w_strokes=True), "w_strokes"),
+    "a stroke direction of pi": (with_entry("instance_theta", 0, np.pi), "theta"),
+    "a stroke without weight": (with_entry("instance_w", 0, 0.0), "instance_w"),
+    "one stroke twice": (with_entry("instance_stroke_pixels", [2, 3], [0, 0]), "strokes"),
+    "a stroke at -1": (with_entry("instance_stroke_pixels", 0, -1), "stroke_pixels"),
+    "a field outside its window": (with_entry("alpha", 0, 4.0), "alpha"),
+    "a skew beyond pi/4": (with_entry("beta", 0, -0.8), "beta"),
+    "a great jump": (with_entry("p", 0, 65), "p[0]"),
+    "the least jump of 32 bits": (with_entry("p", 0, -(2**31)), "p[0]"),
+    "a far centre": (with_entry("centre_alpha", 0, -16.1), "centre_alpha"),
+    "a far centre of beta": (with_entry("centre_beta", 0, 16.1), "centre_beta"),
+    "a spacing of 0": (with_entry("level_0_h", 0, 0.0), "level_0_h"),
+    "a spacing below 0": (with_entry("level_0_h", 0, -0.1), "level_0_h"),
+    "a wide spacing": (with_entry("level_0_h", 0, 0.8), "level_0_h"),
+    "another spacing": (lambda a: a | {"level_1_h": a["level_0_h"] / 3}, "level_1_h"),
+    "no cell": (with_entry("level_0_ranges", 1, 1), "level_0_ranges"),
+    "a count below 0": (with_entry("level_0_ranges", 1, -9), "level_0_ranges"),
+    "many labels": (with_entry("level_0_ranges", 1, 4097), "level_0_ranges"),
+    "labels far away": (with_entry("level_0_ranges", 0, -(2**31)), "level_0_ranges"),
+    "a unit below 0": (with_entry("level_0_share_unit", 0, -1e-9), "share_unit"),
+    "a great unit": (with_entry("level_2_table_unit", 0, 1.1), "table_unit"),
+    "a quad at -1": (with_entry("level_2_quads", 0, -1), "level_2_quads"),
+    "a quad beyond the pixels": (with_entry("level_2_quads", 0, 4), "level_2_quads"),
+    "a pixel without a quad": (with_entry("level_2_quads", 0, 0), "level_2_quads"),
+    "a quad twice": (lambda a: a | {"level_2_quads": np.repeat(a["level_2_quads"], 2)}, "out of order"),
+    "a cut at no pixel": (lambda a: a | {"cuts": np.array([-2], "i4")}, "cuts"),
+    "a cut at no pair": (lambda a: a | {"cuts": np.array([8], "i4")}, "cuts"),
+    "a great multiplier": (with_entry("multipliers", 0, -2e6), "multipliers"),
+    "a claim below everything": (lambda a: with_head(a, bound=-np.inf), "bound is not in"),
+    "a claim that is no number": (lambda a: with_head(a, bound=np.nan), "bound is not in"),
+    "an infinite energy": (lambda a: with_head(a, energy=np.inf), "energy is not in"),
+    "levels that are no whole number": (lambda a: with_head(a, levels=2.5), "levels"),
+}
+
+
+def test_each_broken_assumption_is_refused_by_name(honest, subtests):
+    sound = check_certificate.read_arrays(str(honest("tables")))
+    assert check_certificate.check_arrays(sound)
+    for kind, (change, message) in BROKEN.items():
+        with subtests.test(kind=kind), pytest.raises(REFUSED, match=re.escape(message)):
+            check_certificate.check_arrays(change(sound))
+
+
+def test_tables_and_slopes_are_those_of_the_norm(honest):
+    sound = check_certificate.read_arrays(str(honest("norm 1")))
+    steep = np.full(len(sound["slopes"]), -1.1)
+    for change, message in (
+        ({"slopes": steep}, "slopes"),
+        ({"level_0_quads": np.array([2], "i4")}, "level_0_quads needs the norm 2"),
+        ({"centre_beta": sound["centre_beta"] + 0.1}, "centre_beta"),
+        ({"level_0_h": sound["level_0_h"] * (1 + 1e-12)}, "level_0_h"),
+    ):
+        with pytest.raises(REFUSED, match=message):
+            check_certificate.check_arrays(sound | change)
