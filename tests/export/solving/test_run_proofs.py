@@ -43,7 +43,7 @@ def test_the_gap_is_relative_to_the_energy(tmp_path, energy, gap, optimal):
     "ended,words",
     [
         ("time", "the time limit ended before a bound was proven"),
-        ("interrupted", "the proof was interrupted"),
+        ("interrupted", "the proof was interrupted before its check confirmed a bound"),
         ("work", "the limit of work ended"),
         ("gap", "the requested gap allows the bound 0"),
     ],
