@@ -173,7 +173,7 @@ def _wrap_row(row: list[str], widths: list[int], right: list[bool]) -> list[list
 
 _LEGEND: Final = """\
   start: the field from which methods begin; off: mean angle from a stroke to
-  the nearer line; <45°: pixels whose lines are less than 45 degrees apart;
+  the nearer line; <45°: {points} whose lines are less than 45 degrees apart;
   sing.: singularities; s: seconds"""
 
 
@@ -189,7 +189,7 @@ def show_report(report: Report, folder: Path) -> None:
         mark = "*" if candidate is report.kept else ""
         rows.append([candidate.method + mark, *table_cells(facts), _describe_status(facts)])
     show_table(report.instance.summary, columns, rows, numbers=columns[1:-1])
-    print_line(_LEGEND)
+    print_line(_LEGEND.format(points=f"{report.instance.domain.kind}s"))
     for candidate in report.candidates:
         if candidate.solution and (answer := _describe_gap(report.facts(candidate))):
             print_line(f"  {candidate.method} {answer}")

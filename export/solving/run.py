@@ -56,14 +56,15 @@ WAITING: Final = "waiting"
 
 
 def plan_sentence(limits: Limits, instance: Instance) -> str:
-    """A sentence on the time limit of a run's searches, in all and each."""
+    """A sentence on the time limit of a run's searches, in all and each, and on what has no limit."""
     timed, in_parallel = [method for method in methods_of(instance) if method.timed], _has_processors(limits)
     one_by_one = sum(not (method.in_parallel and in_parallel) for method in timed)
     limits_of_methods = ", ".join(
         f"{method.name} {limits.time_limit:g}{' in parallel' * (method.in_parallel and in_parallel)}"
         for method in sorted(timed, key=lambda method: method.in_parallel)
     )
-    return f"at most {one_by_one * limits.time_limit:g} s: {limits_of_methods}; files and pictures on top"
+    total = f"{one_by_one * limits.time_limit:g} s"
+    return f"searches take at most {total} ({limits_of_methods}); compiling, files and pictures take more"
 
 
 def run(

@@ -10,7 +10,6 @@ was not tried is reported, with its reason.
 
 from __future__ import annotations
 
-import gzip
 import json
 import shutil
 import tempfile
@@ -21,11 +20,13 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.errors import CrossfieldError, InputError, UnsupportedBySolverError
+from ...models.errors import CrossfieldError, InputError, UnsupportedBySolverError, naming
 from ...models.field.field import CrossField
 from ...models.formulations.names import column_names
 from ...models.formulations.problem import Problem
+from ...models.input_limits import MAX_SOLUTION
 from ...models.orthogonal.energy import OrthogonalEnergy, field_of, integers_of
+from ...models.packed import unpack
 from ...models.processes.deadline import Deadline
 from ...models.processes.limits import Limits
 from ...models.storage import read_bytes, sha256_of, write_bytes
@@ -156,7 +157,8 @@ def _unpack_file(source: Path, folder: Path) -> Path:
     """An uncompressed copy of the file."""
     path = folder / source.name.removesuffix(".gz")
     if source.suffix == ".gz":
-        path.write_bytes(gzip.decompress(read_bytes(source)))
+        with naming(source):
+            path.write_bytes(unpack(read_bytes(source), MAX_SOLUTION))
     else:
         shutil.copyfile(source, path)
     return path

@@ -189,6 +189,8 @@ class Problem:
         """How its windows were narrowed, one line; empty if they were not."""
         if self.windows is None:
             return ""
+        if self.formulation.options.relax:
+            return f"{self.windows.summary}; the relaxation may rise"
         if norm_of(self.formulation.declaration, self.formulation.options) == self.windows.norm:
             return f"{self.windows.summary}; the optimum stays"
         return f"{self.windows.summary}; in another norm the optimum may rise"
@@ -198,9 +200,10 @@ class Problem:
         """What the limits of residuals cut off, one line; empty without them."""
         if not self.formulation.options.limits:
             return ""
+        effect = "the relaxation may rise" if self.formulation.options.relax else "the optimum stays"
         return (
             "|A| and |R| at most pi/4 (1 - r), r the effective resistance of the pair or stroke times its "
-            "conductance; this cuts off fields that a change of one jump improves, and the optimum stays"
+            f"conductance; this cuts off fields that a change of one jump improves, and {effect}"
         )
 
     @cached_property

@@ -6,10 +6,8 @@ which replace every search. Points are also checked by the exact program that ev
 
 from __future__ import annotations
 
-import gzip
 import os
 import tempfile
-import zlib
 from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -17,6 +15,8 @@ from pathlib import Path
 from typing import Final
 
 from ....models.errors import CrossfieldError, InputError
+from ....models.input_limits import MAX_SOLUTION
+from ....models.packed import unpack
 from ....models.processes.deadline import Progress, silent
 from ....models.storage import read_bytes
 from ...formats.registry import program_version
@@ -150,9 +150,9 @@ def _find_differences(
 
 def _read_unpacked(path: Path) -> bytes:
     """The bytes of a file, unpacked, because versions of zlib pack differently; as they are if damaged."""
-    data = read_bytes(path)
-    with suppress(OSError, EOFError, zlib.error):
-        return gzip.decompress(data) if path.suffix == ".gz" else data
+    data = read_bytes(path, MAX_SOLUTION)
+    with suppress(InputError):
+        return unpack(data, MAX_SOLUTION)
     return data
 
 

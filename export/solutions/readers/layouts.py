@@ -93,7 +93,10 @@ CBC = TextLayout(
     "CBC, the file of its command solution",
     signature=rb"[A-Z][^\n]{2,100}? - objective value",
     forms=("index name value number",),
-    claims=(rb"(?P<status>[A-Z][^\n]{2,100}?) - objective value +(?P<objective>\S+)",),
+    claims=(
+        rb"(?P<none>(?P<status>[A-Z][^\n]{2,100}?) - objective value +1e\+50)",
+        rb"(?P<status>[A-Z][^\n]{2,100}?) - objective value +(?P<objective>\S+)",
+    ),
     end=rb"Total time .*",
     pointless=rb"(?:integer |linear relaxation )?(?:infeasible|unbounded)|.*continuous used",
     omits_zeros=None,
@@ -109,7 +112,8 @@ Values have 8 significant digits, so violations up to about 1e-7 of a value's si
 `printingOptions all` or `rows` puts the rows before the columns. Their numbers then start again, and names
 before that must not be columns. Some versions and options omit columns at 0; a file with a value of 0 does
 not. A file of an infeasible problem looks the same, and a file of a search without result holds the
-relaxation, (no integer solution - continuous used): both hold no point."""
+relaxation, (no integer solution - continuous used): both hold no point. Stopped before it has any, CBC
+writes the objective 1e+50 and no columns."""
 
 GAMS = TextLayout(
     "gams-csv",

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import bz2
-import gzip
-import io
-import lzma
-import zlib
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
-from itertools import islice
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
-from ....models.errors import SolutionError, naming
+from ....models.errors import InputError, SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
+from ....models.packed import unpack, unpack_start
 from ....models.storage import read_bytes
 from ...statuses import Status, claim_of, status_of_gams
 from ...writing.stamps import digits_in_columns, digits_in_text
@@ -29,12 +23,6 @@ from .text import Claim, RawSolution, Reader, choose_solution, reader_of, refuse
 
 _NEAR_ONE: Final = 1e-5
 _SMALLER: Final = "let the solver write it without columns at 0"
-_PACKED: Final[dict[bytes, Callable[[io.BytesIO], Any]]] = {
-    b"\x1f\x8b": lambda stream: gzip.GzipFile(fileobj=stream),
-    b"BZh": bz2.BZ2File,
-    b"\xfd7zXZ\0": lzma.LZMAFile,
-}
-"""How files that begin so are unpacked."""
 
 
 def _claim_of_highs(scan: Scan) -> tuple[Status, str]:
@@ -88,12 +76,13 @@ def read_raw(path: str | Path, solution: int | None = None) -> RawSolution:
     """Read a solution file; its content determines its kind, and gzip, bzip2 and xz are unpacked.
 
     solution: number of the solution in a file with several, by default the best. Raises InputError when the
-    file cannot be opened or has more than MAX_SOLUTION bytes, SolutionError when it is empty, malformed or of
+    file cannot be opened, is packed and damaged, or holds more than MAX_SOLUTION bytes or memory allows;
+    SolutionError when it is empty, malformed or of
     an unknown kind.
     """
     data = read_bytes(path, MAX_SOLUTION, _SMALLER)
     with naming(path):
-        return parse_raw(_unpack(data), solution)
+        return parse_raw(unpack(data, MAX_SOLUTION, _SMALLER), solution)
 
 
 def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
@@ -145,30 +134,8 @@ def _stated_stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
     return digits_in_text(head) | digits_in_columns(names[chosen].tolist())
 
 
-def _unpack(data: bytes) -> bytes:
-    """The content of a packed file, or the data themselves. Raises SolutionError."""
-    content = _unpack_start(data, MAX_SOLUTION + 1)
-    if len(content) > MAX_SOLUTION:
-        raise SolutionError(f"unpacks to more than {MAX_SOLUTION} bytes; {_SMALLER}")
-    return content
-
-
 def head_of(data: bytes) -> bytes:
     """The first bytes of a file, unpacked, as `plain_text` returns them; as they are if they are damaged."""
-    with suppress(SolutionError), refuse_faults():
-        return plain_text(_unpack_start(data, HEAD))
+    with suppress(InputError, SolutionError), refuse_faults():
+        return plain_text(unpack_start(data, HEAD))
     return data[:HEAD]
-
-
-def _unpack_start(data: bytes, limit: int) -> bytes:
-    """At most `limit` bytes of a packed file, or of the data themselves. Raises SolutionError."""
-    opened = next((opened for start, opened in _PACKED.items() if data.startswith(start)), None)
-    if opened is None:
-        return data[:limit]
-    try:
-        stream = opened(io.BytesIO(data))
-        # Piece by piece: to read a length makes room for all of it.
-        pieces = islice(iter(lambda: stream.read(HEAD), b""), -(-limit // HEAD))
-        return b"".join(pieces)[:limit]
-    except (OSError, EOFError, zlib.error, lzma.LZMAError) as error:
-        raise SolutionError("the packed file is damaged or cut off; pack it again") from error

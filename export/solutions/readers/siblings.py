@@ -73,6 +73,13 @@ SIBLINGS: Final[tuple[tuple[bytes, str], ...]] = (
     ),
     (rb"\A(?:c[^\n]*\n)*p (?:lp|mip) (?:min|max) ", _MODEL.format("GLPK")),
     (
+        (
+            rb"\A(?:(?:#[^\n]*)?\n)*(?:[A-Z][A-Za-z]+[ \t]+\S+\n)*?"
+            rb"(?:TimeLimit|MIPGap|Threads|Seed|MIPFocus|Presolve|Method|OutputFlag|LogFile|\w+Tol)[ \t]"
+        ),
+        "this is a parameter file of Gurobi (.prm); give the .sol or .json that Gurobi writes",
+    ),
+    (
         rb"\A(?:[a-z]\w*_\d\d+(?:_\d\d+(?:_[ur])?)?\n){2}",
         "this is a list of the names in an .nl file (.col or .row); give the .sol that the solver writes",
     ),

@@ -24,7 +24,7 @@ def listing(folder):
     return {path: path.stat().st_size for path in sorted(folder.rglob("*"))}
 
 
-PLAN = re.compile(r"\Aat most .+ s: .+; files and pictures on top\n\Z")
+PLAN = re.compile(r"\Asearches take at most .+ s \(.+\); compiling, files and pictures take more\n\Z")
 """Line that `run` prints after reading the sketch."""
 
 

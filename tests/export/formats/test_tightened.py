@@ -64,6 +64,20 @@ def test_windows_are_narrower_and_hold_the_optimum(proof):
         assert plain.tightened == ""
 
 
+def test_a_tightened_relaxation_may_rise_and_says_so(proof):
+    """Narrower windows cut off points of the relaxation, whose optimum is 0 here, and no optimal field."""
+    certificate, _ = proof
+    windows = remaining_windows(certificate)
+    relaxed = formulate(certificate.field.instance, "miqp-exact", relax=True)
+    narrow = with_windows(relaxed, windows)
+    assert cf.solve(relaxed, "ipopt").objective < cf.solve(narrow, "ipopt").objective - 1e-4
+    assert narrow.tightened.endswith("the relaxation may rise")
+    for name in SKEWED:
+        if not FORMULATIONS[name].fixed:
+            problem = formulate(certificate.field.instance, name, relax=True)
+            assert "stays" not in with_windows(problem, windows).tightened
+
+
 def test_the_optimum_is_that_of_the_whole_problem(proof):
     """Bonmin, exact on a convex problem, against the least squares of all jumps."""
     certificate, _ = proof

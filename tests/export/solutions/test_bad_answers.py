@@ -1,9 +1,14 @@
 """Answers that are damaged, cut, hostile or of other kinds: refused with file, place and remedy."""
 
+import bz2
 import gzip
 import json
+import lzma
+import os
 import re
 import struct
+import subprocess
+import sys
 import tracemalloc
 from contextlib import suppress
 from dataclasses import replace
@@ -135,7 +140,7 @@ def test_files_that_cannot_be_read_are_refused(tmp_path, monkeypatch):
         (packed[:2], "damaged or cut off"),
     ):
         path.write_bytes(data)
-        with pytest.raises(SolutionError, match=fault):
+        with pytest.raises((InputError, SolutionError), match=fault):
             read_raw(path)
     with path.open("wb") as stream:
         stream.truncate(MAX_SOLUTION + 1)
@@ -144,8 +149,45 @@ def test_files_that_cannot_be_read_are_refused(tmp_path, monkeypatch):
         read_raw(path)
     monkeypatch.setattr(registry, "MAX_SOLUTION", 1000)
     path.write_bytes(gzip.compress(bytes(1001)))
-    with pytest.raises(SolutionError, match=r"x.sol: unpacks to more than 1000 bytes; .* at 0"):
+    with pytest.raises(InputError, match=r"x.sol: unpacks to more than 1000 bytes, .* at 0"):
         read_raw(path)
+
+
+TRAP = r"""
+import bz2, gzip, lzma, resource, sys
+from pathlib import Path
+resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
+from crossfield.export.solutions.readers.registry import read_raw
+from crossfield.models.errors import InputError
+packed = {packer}.compress(b"alpha_00_00 0\n" + b"0" * 100_000_000)
+assert len(packed) < 200_000
+Path("trap.sol").write_bytes(packed)
+try:
+    read_raw("trap.sol")
+except InputError as error:
+    assert "unpacks to more than" in str(error), error
+else:
+    sys.exit("it was read")
+"""
+
+
+@pytest.mark.parametrize("packer", ["gzip", "bz2", "lzma"])
+def test_a_small_file_that_holds_100_megabytes_is_refused_at_once(packer, tmp_path):
+    command = [sys.executable, "-c", TRAP.replace("{packer}", packer)]
+    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"}
+    done = subprocess.run(command, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_long_list_of_zeros_may_be_packed_well(tmp_path):
+    """xz packs honest lists of columns at 0 by a factor of 80."""
+    names = [f"p1_{row:04d}_{column:04d}_u" for row in range(100) for column in range(300)]
+    text = "".join(f"{name} 0\n" for name in names).encode()
+    path = tmp_path / "x.sol"
+    for packer in (gzip, bz2, lzma):
+        path.write_bytes(packer.compress(text))
+        assert len(text) > 10 * path.stat().st_size or packer is gzip
+        assert len(read_raw(path).values) == len(names)
 
 
 CUT = "the last line has no end, so the value of"

@@ -69,6 +69,20 @@ def test_starts_that_crossfield_writes_are_called_starts(written):
         assert "this is a MIP start (.mst)" in refusal(path)
 
 
+@pytest.mark.needs("gurobi")
+@pytest.mark.filterwarnings("ignore")
+def test_parameters_of_gurobi_are_named_as_such(tmp_path):
+    import gurobipy
+
+    with gurobipy.Env(params={"OutputFlag": 0}) as environment, gurobipy.Model(env=environment) as model:
+        for name, value in (("IISMethod", 1), ("TimeLimit", 7), ("MIPGap", 0.01)):
+            model.setParam(name, value)
+        model.write(str(tmp_path / "x.prm"))
+    assert "this is a parameter file of Gurobi" in refusal(tmp_path / "x.prm")
+    (tmp_path / "list.sol").write_text("".join(f"X{number} {number}\n" for number in range(5)))
+    assert read_raw(tmp_path / "list.sol").has_point
+
+
 def test_starts_in_a_layout_of_answers_are_read(written):
     for pattern in ("*.highs.sol", "*.scip.sol", "*.xpress.slx"):
         (path,) = written.glob(pattern)

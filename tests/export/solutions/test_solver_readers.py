@@ -195,6 +195,12 @@ def test_words_of_scip_are_statuses(words, status, without_point):
     assert (raw.status, raw.has_point) == (without_point, False)
 
 
+def test_cbc_without_a_point_may_write_a_single_line():
+    for words, status in (("Stopped on time", NOTHING), ("Stopped on nodes", NOTHING), ("Optimal", ERROR)):
+        raw = parse_raw(f"{words} - objective value 1e+50\n".encode())
+        assert (raw.reader, raw.status, raw.has_point, raw.objective) == ("cbc", status, False, None)
+
+
 def test_cbc_with_rows_and_marks_gives_the_same_columns():
     plain, with_rows = (read_raw(TINY / f"{B}_milp_optimal{end}.sol") for end in ("", "_all"))
     assert plain.names.tolist() == with_rows.names.tolist() == names_of("milp").tolist()

@@ -240,6 +240,8 @@ def test_other_instances_are_refused_with_a_remedy(tmp_path):
     assert limited == {"miqp-orthogonal", "miqp-cycle"}
     problem = next(manifest for manifest in manifests if manifest.formulation == "miqp-cycle").problem()
     assert "the optimum stays" in problem.limited
+    relaxed = formulate(right, "miqp-orthogonal", limits=True, relax=True)
+    assert relaxed.limited.endswith("the relaxation may rise")
 
 
 def test_an_export_names_what_it_leaves_out(tmp_path, capsys):
