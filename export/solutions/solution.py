@@ -296,7 +296,7 @@ class Solution:
             return f"its dual bound {self.bound:.6g} leaves a gap, so it is not optimal within 1e-4"
         if self.status is Status.OPTIMAL_IN_GAP:
             return "optimal within a gap that is not in it: --gap X states the gap, --bound X the dual bound"
-        if self.status is Status.FEASIBLE and not self.message:
+        if self.status is Status.FEASIBLE and self.bound is None and not self.message:
             return f"it states no status; {self.silent or '--bound X states the dual bound of the program'}"
         return ""
 

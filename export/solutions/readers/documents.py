@@ -89,12 +89,24 @@ def parse_document(data: bytes) -> RawSolution:
     layout = next((known for known in _OTHERS if _at(content, known.status) is not None), None)
     if layout is not None:
         return _solution(content, layout)
+    content |= _columns_of_frame(content)
     inner = next((key for key in ("variables", "values", "solution") if key in content), "columns")
     if inner == "columns":
         content |= {inner: {key: value for key, value in content.items() if key not in _CLAIMS}}
     return _solution(
         content, _DocumentLayout("plain", (inner,), ("status",), "other", ("objective",), ("bound",))
     )
+
+
+def _columns_of_frame(content: dict[str, Any]) -> dict[str, Any]:
+    """The columns of a data frame of pandas with names and values: its records, columns, or split parts."""
+    table = content.get("data")
+    if len(content) == 2 and all(isinstance(part, dict) for part in content.values()):
+        names, values = content.values()
+        table = [[names[row], values.get(row)] for row in names]
+    rows = table if isinstance(table, list) else []
+    is_table = all(isinstance(row, list) and len(row) == 2 and isinstance(row[0], str) for row in rows)
+    return {"variables": list(map(tuple, rows))} if rows and is_table else {}
 
 
 def _solution(content: dict[str, Any], layout: _DocumentLayout) -> RawSolution:
@@ -187,6 +199,9 @@ def _document(data: bytes) -> dict[str, Any]:
         ) from error
     except (ValueError, RecursionError) as error:
         raise SolutionError(f"the JSON is damaged; {_AGAIN}") from error
+    if isinstance(content, list):
+        rows = [list(row.values()) if isinstance(row, dict) else row for row in content]
+        content = {"data": rows}
     if not isinstance(content, dict):
         raise SolutionError(f"the JSON holds no solution; {_AGAIN}")
     return content
@@ -215,7 +230,7 @@ READERS: Final = (
     Reader(
         "json",
         "JSON of PuLP or Pyomo, or of names and values",
-        starts_with(rb'\s*\{(?!\s*"SolutionInfo")'),
+        starts_with(rb"\s*(?:\{(?!\s*(?:\"SolutionInfo\"|'))|\[\s*\{)"),
         parse_document,
     ),
 )

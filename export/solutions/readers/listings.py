@@ -193,6 +193,46 @@ LISTINGS = (
         rewrites=((b"Variable:", rb"(?m)^ {4}(\S+):\n {6}Value: (\S+)\n", rb"\1 \2\n\n"),),
     ),
     TextLayout(
+        "osrl",
+        "OSrL, the results of Optimization Services",
+        signature=rb"(?:<\?xml[^\n]*\n(?:[^\n]*\n){0,9}?)?[ \t]*<osrl\b",
+        claims=(rb"STATUS (?P<status>\S+)", rb"OBJ (?P<objective>\S+)"),
+        rewrites=(
+            (b"<", rb">\s*<", b">\n<"),
+            (
+                b"<",
+                rb"<solutionStatus|<status\b(?=[^\n]*(?:optimal|infeasible|unbounded|feasible))",
+                b"<STATUS",
+            ),
+            (b"<STATUS", rb'<STATUS[^\n]*?type="(\w+)"[^\n]*', rb"STATUS \1"),
+            (b"<obj", rb"<obj\b[^>]*>\s*([^<\s]+)\s*</obj>", rb"OBJ \1"),
+            (b"<var", rb'<var\b[^>\n]*\bname="([^"\s]+)"[^>\n]*>\s*([^<\s]+)\s*</var>', rb"\1 \2"),
+            (b"<", rb"(?m)^[ \t]*<.*$", b""),
+        ),
+    ),
+    TextLayout(
+        "data-frame",
+        "CSV of pandas with an index, or of linopy",
+        signature=rb'\A(?:"?\w*"?,"?\w+"?,"?\w+"?[ \t]*\n"?\d+"?,"?[A-Za-z]|"?labels"?,"?lower"?,"?upper"?,)',
+        forms=("number name value", "name number number value"),
+        separator=b",",
+        begin=rb'"?[A-Za-z_]*"?,.*',
+        rewrites=(_QUOTES,),
+    ),
+    TextLayout(
+        "assignments",
+        "assignments of Python, Julia, AMPL or GAMS",
+        signature=rb"\A\s*(?:\{'|Dict\b|\"?\w+\"?[ \t]*=>|let[ \t]+\w+[ \t]*:=|\w+\.l[ \t]*=)",
+        separator=b"=:",
+        rewrites=(
+            (b"", rb"\A\s*(?:Dict[^\n(]*\(?|\{)|[)}]\s*\Z", b""),
+            (b"", rb"(?m)['\"]|^[ \t]*let\b|;[ \t]*$", b" "),
+            (b"=", rb":=|=>", b"="),
+            (b"=", rb"(?mi)\.l(?=[ \t]*=)", b""),
+            (b",", rb",[ \t]*\n?", b"\n"),
+        ),
+    ),
+    TextLayout(
         "list-in-text",
         "names and values in other text",
         signature=rb"\A\s*%b(?:%b[^\n]*\n)+?(?P<answer>(?:[ \t]*(?:ONE|%b)\w*[ \t]+%b[ \t]*\n){5})"

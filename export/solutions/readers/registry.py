@@ -95,7 +95,10 @@ def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
     head, readers = text[:HEAD], recognising_readers(text)
     if not readers:
         known = "; ".join(reader.description for reader in READERS)
-        unknown = f"this is not a solution file of a known kind; give one of these: {known}"
+        python = "for name, value in values.items(): print(name, value, file=answer)"
+        unknown = (
+            f"this is not a solution file of a known kind; give one of these: {known}; in Python: {python}"
+        )
         raise SolutionError(sibling_of(head) or log_of(head) or unknown)
     if len(readers) > 1:
         kinds = " and ".join(reader.description for reader in readers)
