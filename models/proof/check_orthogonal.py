@@ -194,20 +194,21 @@ def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring
 
 def limits_of(rows: CentredRows) -> Array:
     """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,)."""
-    n, first, second, weight = rows.size, rows.first, rows.second, rows.weight
+    n, first, second = rows.size, rows.first, rows.second
     if n > MOST_DENSE:
         return np.full(len(first), QUARTER + RELATIVE)
+    weight = rows.weight / max(rows.weight.max(initial=0.0), 1e-300)  # the limits do not depend on the unit
     matrix = np.zeros((n + 1, n + 1))
     np.add.at(matrix, (first, second), weight)
     degree = (matrix := matrix + matrix.T).sum(axis=1)
-    matrix = np.diag(degree + 1e-9 * max(degree.max(), 1e-300)) - matrix
+    matrix = np.diag(degree + 1e-9 * max(degree.max(), 1.0)) - matrix
     inverse = np.pad(np.linalg.inv(matrix[:n, :n]), (0, 1))
-    resistance = np.zeros(len(first))
+    share = np.zeros(len(first))  # weight times resistance
     for e, (i, j) in enumerate(rows.ends):  # any potential gives a lower bound of the resistance
         potential = inverse[i] - inverse[j]
         drop = potential[first] - potential[second]
-        resistance[e] = drop[e] ** 2 / max(weight @ (drop * drop), 1e-300)
-    return QUARTER * np.clip(1 - weight * resistance * (1 - RELATIVE), 0.0, 1.0) + RELATIVE
+        share[e] = weight[e] * drop[e] ** 2 / max(weight @ (drop * drop), 1e-300)
+    return QUARTER * np.clip(1 - share * (1 - RELATIVE), 0.0, 1.0) + RELATIVE
 
 
 # Section 2: labels, cells and costs ------------------------------------------------------------------------

@@ -91,7 +91,7 @@ class RingDual:
         turned = (np.roll(np.arange(a, b), -counts[on_ring[a:b]].argmin()) for a, b in pairwise(start))
         walk = np.array([step for steps in turned for step in steps], int)
         self.rings = RingArrays(start, walk, pair, sign, counts[on_ring], begin, np.zeros(begin[-1]))
-        self.work = _OF_PAIRS * len(pairs.row) + float((counts[on_ring] ** 3).sum())  # of the checker
+        self.work = 1.0 + _OF_PAIRS * len(pairs.row) + float((counts[on_ring] ** 3).sum())  # of the checker
 
     def pass_over(self, most: float, *, forward: bool) -> tuple[float, float]:
         """One pass: the bound, if no tables cost anything, and the share of labels that `most` leaves."""
