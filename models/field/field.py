@@ -202,6 +202,16 @@ class CrossField(Pictured):
             beta = np.zeros_like(beta)
         return cls(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
+    def on_instance(self, instance: Instance) -> CrossField:
+        """The field on this instance: itself, or its crosses where only the gauge is another one.
+
+        Its energy may then differ, as of `field_in_windows`. Raises InstanceError for another instance.
+        """
+        if self.instance.sha256 == instance.with_gauge(self.instance.gauge).sha256 != instance.sha256:
+            return field_in_windows(instance, self.alpha, self.beta, self.p)
+        self.check_instance(instance)
+        return self
+
     def check_instance(self, instance: Instance) -> None:
         """Raise InstanceError unless the field is on this instance."""
         if self.instance.sha256 != instance.sha256:

@@ -106,7 +106,8 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
         order and of any length: u, v, -u and -v. Faces are those of the mesh; on a grid the triangles that
         `write_field` writes, or one per pixel.
     on
-        The instance that the field must be on. All files but .npz and .json need it: they contain none.
+        The instance that the field must be on; a field of its other gauge is moved into its windows. All
+        files but .npz and .json need it: they contain none.
 
     Returns
     -------
@@ -129,9 +130,7 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
             return TEXT_READERS[path.suffix.lower()](read_bytes(path, most_text_bytes(on)), on)
         read = _look_up_suffix(_READERS, path, "read", *TEXT_READERS)
         field = read(read_bytes(path, MAX_ARCHIVE))
-        if on is not None:
-            field.check_instance(on)
-        return field
+        return field if on is None else field.on_instance(on)
 
 
 def _look_up_suffix(table: dict[str, _Entry], path: Path, verb: str, *others: str) -> _Entry:

@@ -98,7 +98,8 @@ def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certi
     """
     path = Path(path)
     if not proof.levels:
-        raise SolverError("is not written: nothing was proven, because no level was completed", file=path)
+        reason = proof.reason or "no level was completed"
+        raise SolverError(f"is not written: nothing was proven, because {reason}", file=path)
     if isinstance(proof, OrthogonalProof):
         if proof.proven is None:
             raise InputError("would hold a proof that is not valid; prove it again", file=path)
@@ -275,8 +276,11 @@ def read_certificate(
         data = read_bytes(path, check_certificate.MOST_BYTES)
         field, bound, proven = _check_any(data, path, jobs, progress)
         if on is not None and field.instance.sha256 != on.sha256:
+            gauge = on.with_gauge("strokes").sha256 == field.instance.sha256
+            remedy = "; choose the gauge strokes: crossfield instance --gauge strokes" if gauge else ""
             raise InputError(
-                f"is a certificate of another instance ({field.instance.summary}), not of {on.summary}",
+                f"is a certificate of another instance ({field.instance.summary}), "
+                f"not of {on.summary}{remedy}",
                 file=path,
             )
     except check_certificate.NotProvenError as error:

@@ -135,8 +135,7 @@ def search(
         check_count("rounds", rounds)
     check_count("seed", seed)
     check_jobs(jobs)
-    if start is not None:
-        start.check_instance(instance)
+    start = None if start is None else start.on_instance(instance)
     with catch_interrupts() as pressed:
         deadline = (limits or Limits(math.inf)).deadline()
         ends = _Ends(deadline, rounds, lambda: pressed() or asked())
