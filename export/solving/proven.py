@@ -20,6 +20,7 @@ _ENDED: Final = {
     "work": "the limit of work ended before a bound was proven; increase it",
     "gap": "the requested gap allows the bound 0; request a smaller one",
     "labels": "the next level would have too many labels",
+    "memory": "its levels take more memory than there is",
 }
 """Reasons of a proof without a bound, by what ended it."""
 
@@ -61,6 +62,6 @@ def certify(proof: Proof | OrthogonalProof, path: Path) -> Certificate:
     from ...models.proof.certificate import write_certificate
 
     if not proof.levels or (proof.proven is not None and proof.bound <= 0 and proof.status == "gap"):
-        reason = _ENDED.get(proof.ended, "its levels prove no bound above 0")
+        reason = proof.reason or _ENDED.get(proof.ended, "its levels prove no bound above 0")
         raise SolverError(f"nothing was proven, and there is no certificate: {reason}")
     return write_certificate(proof, path)

@@ -180,8 +180,11 @@ class Descent:
     def run(self) -> str:
         """Go through chains of levels until a limit is met or nothing helps; return the reason."""
         self.began, ended = time.monotonic(), ""
-        while not ended:
-            ended = self._go_through_levels()
+        try:
+            while not ended:
+                ended = self._go_through_levels()
+        except MemoryError:
+            ended = "memory"
         return self.ends.reason() or ended
 
     def _go_through_levels(self) -> str:

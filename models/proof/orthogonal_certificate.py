@@ -30,7 +30,7 @@ class OrthogonalProof(Claim):
 
     Parameters
     ----------
-    field, energy, bound, forced, seconds, ended
+    field, energy, bound, forced, seconds, ended, reason
         As in `Proof`.
     levels
         The last chain of levels, coarsest first.
@@ -50,6 +50,7 @@ class OrthogonalProof(Claim):
     arrays: Arrays
     threshold: float
     norm: Norm = 2
+    reason: str = ""
     proven: ProvenClaim | None = field(default=None, repr=False)
 
     def certificate(self) -> Arrays:

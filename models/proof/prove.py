@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Callable
 from dataclasses import replace
+from typing import TypeVar
 
 from ..arguments import check_count
 from ..errors import InputError
-from ..field.field import CrossField, Norm, check_norm, field_in_windows
+from ..field.field import CrossField, Norm, check_norm
 from ..instance.instance import Instance
 from ..processes.child_program import WorkerError
 from ..processes.compilation import crew
@@ -23,8 +25,11 @@ from .compiling import compile_proofs
 from .descent import Descent, Termination
 from .orthogonal import prove_orthogonal
 from .orthogonal_certificate import OrthogonalProof
+from .orthogonal_certificate import check_proof as check_orthogonal_proof
 from .record import Proof
 from .stroked_parts import extended, restricted, stroked_parts
+
+_AnyProof = TypeVar("_AnyProof", Proof, OrthogonalProof)
 
 
 @one_thread()
@@ -106,10 +111,8 @@ def prove(
     check_count("seed", seed)
     if work is not None:
         check_count("work", work, 1)
-    if start is not None:
-        start.check_instance(instance)
-        start = field_in_windows(instance.with_gauge("strokes"), start.alpha, start.beta, start.p)
     instance = instance.with_gauge("strokes")
+    start = None if start is None else start.on_instance(instance)
     check_jobs(jobs)
     chosen, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
     with catch_interrupts() as interrupted, crew(chosen.threads or jobs) as threads:
@@ -123,7 +126,8 @@ def prove(
         began = time.monotonic()
         ends = Termination(Deadline.after(seconds, end.clock), over, chosen.gap, work or math.inf)
         if instance.orthogonal:
-            return prove_orthogonal(instance, start, ends, progress, seed)
+            proven, limit = prove_orthogonal(instance, start, ends, progress, seed)
+            return _checked_proof(proven, lambda: check_orthogonal_proof(proven, limit), progress)
         part = stroked_parts(instance)
         start = None if start is None else restricted(start, part)
         kind = Descent if norm == 2 else AbsoluteDescent
@@ -133,17 +137,23 @@ def prove(
     field = extended(proof.field, instance)
     energy = field.energy(norm).total
     proof = replace(proof, field=field, energy=energy, seconds=time.monotonic() - began)
-    return _checked_proof(proof, chosen.threads or jobs, progress) if proof.levels else proof
+    return _checked_proof(proof, lambda: check_proof(proof, chosen.threads or jobs, progress), progress)
 
 
-def _checked_proof(proof: Proof, jobs: int, progress: Progress) -> Proof:
-    """The proof as the checker confirms it; the bound 0 where it does not."""
+def _checked_proof(proof: _AnyProof, check: Callable[[], _AnyProof], progress: Progress) -> _AnyProof:
+    """What a check confirms of a proof: no level, with the reason, where it fails."""
+    if not proof.levels:
+        return proof
+    ended, reason = proof.ended, ""
     try:
         progress("checking the levels")
-        return check_proof(proof, jobs, progress)
+        return check()
     except KeyboardInterrupt:
         if are_interrupts_caught():
             raise
-        return replace(proof, bound=0.0, forced=0, levels=(), ended="interrupted")
-    except (*REFUSALS, MemoryError, WorkerError):  # `write_certificate` names the reason
-        return replace(proof, bound=0.0, forced=0)
+        ended = "interrupted"
+    except MemoryError:
+        reason = "the check of its levels takes more memory than there is"
+    except (*REFUSALS, WorkerError) as error:
+        reason = f"the check of its levels failed: {error}"
+    return replace(proof, bound=0.0, forced=0, levels=(), ended=ended, reason=reason)

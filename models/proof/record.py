@@ -95,14 +95,16 @@ class Proof(Claim):
     seconds
         Duration of the work without the check.
     ended
-        `optimal`, `gap` (the requested one), `time`, `work`, `interrupted`, or `labels` if the next level
-        would be too large.
+        `optimal`, `gap` (the requested one), `time`, `work`, `interrupted`, `labels` if the next level would
+        be too large or prove no more, or `memory` if it took more than there is.
     norm
         1, 2 or `mixed`.
     proven
         Findings of the checker; None before the check.
     pieces
         The arrays of the certificate that prove the last step, None without one.
+    reason
+        Why nothing is proven, where `ended` does not tell; empty otherwise.
 
     """
 
@@ -112,4 +114,5 @@ class Proof(Claim):
     ended: str
     norm: Norm = 2
     pieces: Arrays | None = field(default=None, repr=False)
+    reason: str = ""
     proven: ProvenClaim | None = field(default=None, init=False, repr=False)  # `replace` leaves it out

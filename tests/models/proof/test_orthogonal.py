@@ -26,6 +26,7 @@ from crossfield.models.proof import check_orthogonal as checker
 from crossfield.models.proof.check_certificate import NotProvenError, UnreadableError, unpack_archive
 from crossfield.models.proof.descent import Termination
 from crossfield.models.proof.orthogonal import prove_orthogonal
+from crossfield.models.proof.orthogonal_certificate import check_proof
 from small_meshes import (
     beyond_forest,
     keeps_optimum,
@@ -178,7 +179,7 @@ def test_levels_end_while_there_is_time_for_their_check(monkeypatch):
     seconds, complete = [], checker.kept_of
     monkeypatch.setattr(checker, "kept_of", lambda *parts: seconds.append(1) or complete(*parts))
     ends = Termination(Deadline.after(12, lambda: float(len(seconds))), never, gap=0.0, work=math.inf)
-    proof = prove_orthogonal(cf.sample("disc").with_gauge("strokes"), None, ends, silent)
+    proof = check_proof(*prove_orthogonal(cf.sample("disc").with_gauge("strokes"), None, ends, silent))
     assert proof.ended == "time"
     assert 0 < len(seconds) <= 12
 

@@ -1,7 +1,11 @@
 """Proofs from end to end: true for all weights, gauges and masks."""
 
+import json
 import math
+import os
 import re
+import subprocess
+import sys
 import threading
 from dataclasses import replace
 from itertools import pairwise
@@ -10,6 +14,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from children import interrupted
+from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.symmetries import mirrored, transposed, turned
@@ -70,6 +75,68 @@ def test_the_proof_in_the_gauge_box_is_that_of_the_gauge_strokes():
         assert proof.status == "optimal"
         assert proof.field.instance.sha256 == instance.with_gauge("strokes").sha256
         assert proof.energy <= optimum(instance).energy().total + 1e-9
+
+
+def test_results_of_a_proof_in_the_gauge_box_fit_its_instance_or_name_the_remedy(tmp_path, capsys):
+    for instance in (random_instance(3, shape=(2, 2), gauge="box"), orthogonal_box()):
+        proof = cf.prove(instance, jobs=1)
+        begun = cf.search(instance, start=proof.field, rounds=0, jobs=1).field
+        assert begun.instance.sha256 == instance.sha256
+        assert begun.energy().total <= cf.greedy_field(instance).energy().total + 1e-9
+        cf.write_certificate(proof, tmp_path / "it.npz")
+        cf.write_field(proof.field, tmp_path / "field.npz")
+        moved = cf.read_field(tmp_path / "field.npz", on=instance)
+        assert moved.instance.sha256 == instance.sha256
+        away = (moved.alpha - proof.field.alpha) / (np.pi / 2)
+        clipped = np.isin(moved.alpha, [instance.alpha_lower, instance.alpha_upper])
+        assert (clipped | (np.abs(away - np.round(away)) < 1e-9)).all()
+        with pytest.raises(InputError, match="choose the gauge strokes"):
+            cf.read_certificate(tmp_path / "it.npz", on=instance)
+        assert (
+            cf.read_certificate(tmp_path / "it.npz", on=instance.with_gauge("strokes")).bound == proof.bound
+        )
+        with pytest.raises(InstanceError, match="another instance"):
+            cf.search(replace(instance, name="other"), start=proof.field, rounds=0)
+        cf.write_instance(instance, tmp_path / "it.json")
+        files = [str(tmp_path / name) for name in ("it.json", "field.npz", "again")]
+        invoke(["prove", files[0], "--start", files[1], "-o", files[2], "--json"])
+        assert json.loads(capsys.readouterr().out)["energy"] <= proof.energy + 1e-12
+
+
+def orthogonal_box():
+    return replace(random_instance(5, shape=(2, 3), gauge="box"), orthogonal=True)
+
+
+def test_a_check_without_memory_gives_its_reason_and_is_not_repeated(tmp_path):
+    program = """if True:
+        import resource
+        from dataclasses import replace
+        import crossfield as cf
+
+        checks = []
+
+        def leave_no_memory(line):
+            if line == "checking the levels":
+                checks.append(line)
+                used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
+                resource.setrlimit(resource.RLIMIT_AS, (used + 2**20, resource.RLIM_INFINITY))
+
+        instance = replace(cf.sample("mouse", 24), orthogonal=True)
+        proof = cf.prove(instance, jobs=1, progress=leave_no_memory, work=1)
+        resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
+        print(len(checks), proof.bound, len(proof.levels), proof.energy == proof.field.energy().total)
+        try:
+            cf.write_certificate(proof, "it.npz")
+        except cf.CrossfieldError as error:
+            print(error)
+    """
+    command = [sys.executable, "-c", program]
+    freed = os.environ | {"MALLOC_MMAP_THRESHOLD_": "65536", "MALLOC_TRIM_THRESHOLD_": "0"}  # at once
+    result = subprocess.run(command, cwd=tmp_path, env=freed, capture_output=True, text=True, check=True)
+    counts, error = result.stdout.splitlines()
+    assert counts == "1 0.0 0 True"
+    assert "the check of its levels takes more memory than there is" in error
+    assert not (tmp_path / "it.npz").exists()
 
 
 def test_turned_and_mirrored_sketches_have_the_same_proven_optimum():
