@@ -463,8 +463,9 @@ def possible_turns(level: CellLevel, squares: Array) -> Array:
     left = squares & np.logical_and(*table.at_ends(table.have_partners(squares)))
     first, second = table.at_ends(h * (level.cells + rows.half[level.owner] / 2))
     row, reach = table.row[left], rows.limit + h * (1 + RELATIVE) + RELATIVE
-    size = np.abs(rows.residual[row] + (first - second)[left] + HALF * TURNS[:, None]) - reach[row]
-    return np.array([np.bincount(row[of_turn <= 0], minlength=len(reach)) > 0 for of_turn in size]).T
+    size, reach = rows.residual[row] + (first - second)[left], reach[row]
+    possible = (np.abs(size + HALF * turn) - reach <= 0 for turn in TURNS)
+    return np.array([np.bincount(row[of_turn], minlength=len(rows.first)) > 0 for of_turn in possible]).T
 
 
 def cases_of(turns: Array) -> list[tuple[int, ...]]:

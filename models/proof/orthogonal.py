@@ -40,7 +40,8 @@ Neighbours = list[list[tuple[int, int]]]  # of each point, its neighbours and th
 
 _COARSEST: Final = 15  # cells of a quarter turn
 _FINEST: Final = 3645
-_MOST_COSTS: Final = 40_000_000  # pairs of labels of a level: some 3 GB
+_MOST_COSTS: Final = 12_000_000  # pairs of labels of a level: 1.4 GB
+_SECONDS: Final = 2e-6  # for each of them on the coarsest level: a forecast
 _SWEEPS: Final = 20  # over all points, in which colours change
 _NARROW: Final = 0.7  # share of the cells left below which the same spacing is worth another level
 _MOST_PASSES: Final = 200
@@ -53,16 +54,17 @@ _ENOUGH: Final = 0.1  # the same for a tiny gap
 _TINY: Final = 1e-3  # relative gap below which finer labels follow
 _MOST_OF: Final = 0.9  # of what rings cost: those with the rest come into use later, unless the gap is loose
 _MANY: Final = 0.1  # share of new rings above which they may come into use at the same spacing
-_LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one
+_LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one, and no chain follows a search
 _WIDE: Final = 0.01  # relative gap after which a search follows, from the second spacing on
-_SEARCH: Final = 0.05  # share of the time left for it
-_ROUNDS: Final = 10  # of that search
+_SEARCH: Final = 0.25  # share of the time left that it takes at most
+_ROUNDS: Final = 10  # of a search without a limit of time
+_PATIENCE: Final = 200  # perturbations per point without success that end all searches
 _BETTER: Final = 1e-9  # relative: a better field; also what a level keeps more than the checker asks for
 
 
 def prove_orthogonal(
     instance: Instance, start: CrossField | None, ends: Termination, progress: Progress, seed: int = 0
-) -> tuple[OrthogonalProof, Floats]:
+) -> tuple[OrthogonalProof, Floats | None]:
     """Find a field of orthogonal crosses, and prove a lower bound of the energy of all.
 
     The instance has the gauge `strokes`. The time limit includes the check, whose seconds are forecast.
@@ -79,9 +81,8 @@ def prove_orthogonal(
 class _CentredLevels:
     """Levels round one centre, and what they prove. arrays: of a certificate, without head and field."""
 
-    rows: CentredRows
-    threshold: float
-    arrays: Arrays
+    threshold: float = math.inf
+    arrays: Arrays = field(default_factory=dict)
     levels: list[LevelFacts] = field(default_factory=list)
     forced: int = 0
     convex: float = -math.inf
@@ -122,7 +123,8 @@ def spanning_forest(near: Neighbours, value: Floats) -> list[int]:
 class _Prover:
     """The best field, and the chain that proves most. z: integers of the field; least: its energy.
 
-    starts: integers to begin with. searched: whether a search was made.
+    starts: integers to begin with. arrays: of all certificates. limit: of Lemma 1. hunt: the search for
+    better integers. searched: its seconds. took: seconds of the last chain. reason: why no level is begun.
     """
 
     instance: Instance
@@ -131,13 +133,24 @@ class _Prover:
     ends: Termination
     progress: Progress
     seed: int = 0
-    searched: bool = False
+    proven: _CentredLevels = field(default_factory=_CentredLevels)
+    arrays: Arrays = field(default_factory=dict)
+    limit: Floats | None = None
+    hunt: IntegerSearch | None = None
+    searched: float = 0.0
+    took: float = 0.0
+    reason: str = ""
 
     def __post_init__(self) -> None:
+        self.z = min(self.starts, key=self.energy.least_total)
+        self.least, self.began = self.energy.least_total(self.z), self.ends.deadline.clock()
+
+    def _prepare_levels(self) -> None:
+        """Compute what all levels share."""
         domain, arrays = self.instance.domain, instance_arrays(self.instance).items()
         length = np.diff(domain.rings.start)
         rings = domain.rings.keep((length >= 3) & (length <= checker.MOST_RING))
-        self.arrays: Arrays = {f"instance_{name}": array for name, array in arrays}
+        self.arrays = {f"instance_{name}": array for name, array in arrays}
         self.arrays |= {"kappa": domain.kappa} if domain.kappa is not None else {}
         self.arrays |= {"ring_start": rings.start, "ring_pair": rings.pair}
         self.arrays |= {"ring_sign": rings.sign.astype(np.int8), "centre": np.zeros(domain.size)}
@@ -149,34 +162,55 @@ class _Prover:
             self.near[j].append((i, pair))
         self.order = reverse_cuthill_mckee(links + links.T, symmetric_mode=True).astype(np.int64)
         self.arrays["half"] = two_colours(domain, self.near, rows.fixed[:-1])
-        self.z = min(self.starts, key=self.energy.least_total)
-        self.limit, self.least = rows.limit, self.energy.least_total(self.z)
-        self.proven = self._begin_chain()
+        self.limit = rows.limit
 
     def proof(self, ended: str, began: float) -> OrthogonalProof:
         """The proof so far, not checked."""
         best, chain = field_of(self.instance, self.z, self.energy), self.proven
-        energy, arrays = best.energy().total, chain.arrays | {"alpha": best.alpha, "p": best.p}
+        arrays = chain.arrays | {"alpha": best.alpha, "p": best.p}
+        energy, levels = best.energy().total, tuple(chain.levels)
         return OrthogonalProof(
-            best, energy, min(chain.bound, energy), chain.forced, tuple(chain.levels),
-            time.monotonic() - began, ended, arrays, chain.threshold,
+            best, energy, min(chain.bound, energy), chain.forced, levels, time.monotonic() - began, ended,
+            arrays, chain.threshold, reason="" if levels else self.reason,
         )  # fmt: skip
 
     def run(self) -> str:
-        """Go through chains of levels until a limit is met or nothing helps; return the reason."""
-        while not (reason := self._go_through_levels()):
-            pass
-        return reason
+        """Go through chains of levels until a limit is met or nothing helps; return the reason.
+
+        Where no level helps, fits or has time, the rest of the time goes to the search.
+        """
+        try:
+            while True:
+                begin = self.ends.deadline.clock() - self.searched
+                reason = self._go_through_levels()
+                self.took = self.ends.deadline.clock() - self.searched - begin
+                if reason and not (reason in ("labels", "time") and self._search_on()):
+                    return reason
+        except MemoryError:
+            return "memory"
+
+    def _reason_against_levels(self) -> str:
+        """The reason why no level is begun; empty if one is: on few points, a first one whatever the time."""
+        reason, small = self.ends.reason(), self.instance.domain.size <= checker.MOST_DENSE
+        costs = len(self.instance.domain.first) * (_COARSEST + 1) ** 2
+        if costs > _MOST_COSTS:
+            self.reason = (
+                f"the coarsest level has {costs} pairs of labels; at most {_MOST_COSTS} fit in memory"
+            )
+            return reason or "labels"
+        if not small and not reason and self.ends.over(_SECONDS * costs):
+            self.reason = f"the coarsest level takes about {_SECONDS * costs:.0f} s; increase the time limit"
+            return "time"
+        return "" if reason == "time" and small and not self.proven.levels else reason
 
     def _go_through_levels(self) -> str:
         """Go through the levels round the best field; the reason of the end, empty for a better field."""
-        reason, small = self.ends.reason(), self.instance.domain.size <= checker.MOST_DENSE
-        if reason and (reason != "time" or self.proven.levels or not small):
+        if reason := self._reason_against_levels():
             return reason
-        if len(self.instance.domain.first) * (_COARSEST + 1) ** 2 > _MOST_COSTS:
-            return "labels"
-        chain = self._begin_chain()
-        rings, level, before = list[int](), checker.first_level(chain.rows, _COARSEST), None
+        if not self.arrays:
+            self._prepare_levels()
+        chain, rows = self._begin_chain()
+        rings, level, before = list[int](), checker.first_level(rows, _COARSEST), None
         while True:
             costs = checker.costs_of(level)
             dual = RingDual(level, costs, self.order, rings)
@@ -193,8 +227,8 @@ class _Prover:
             if chain.bound >= self.proven.bound:
                 self.proven = chain
             reason = self._reason_to_end(chain)
-            search = not self.searched and level.divisions > _COARSEST and chain.gap > _WIDE * self.least
-            if reason or self.least < least or (search and self._search(_SEARCH * self.ends.deadline.left())):
+            search = level.divisions > _COARSEST and chain.gap > _WIDE * self.least
+            if reason or self.least < least or (search and self._search_if_due()):
                 return reason
             loose = self.least - chain.bound > _LOOSE * self.least
             more = self._more_rings(dual, 1.0 if loose else _MOST_OF)
@@ -206,13 +240,13 @@ class _Prover:
             rings = rings + more
             level, before = checker.next_level(level, squares, factor), dual
 
-    def _begin_chain(self) -> _CentredLevels:
-        """A chain round the best field, without levels."""
+    def _begin_chain(self) -> tuple[_CentredLevels, CentredRows]:
+        """A chain round the best field, without levels, and its rows."""
         best = field_of(self.instance, self.z, self.energy)
         arrays = self.arrays | {"centre": self.energy.fit_angles(self.z), "divisions": np.zeros(0, np.int32)}
         rows = checker.CentredRows(arrays, self.limit)
         energy, error, _ = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
-        return _CentredLevels(rows, energy * (1 + _BETTER) + 2 * error, arrays)
+        return _CentredLevels(energy * (1 + _BETTER) + 2 * error, arrays), rows
 
     def _ascend(self, dual: RingDual, chain: _CentredLevels, ahead: float) -> bool:
         """Passes until the bound rises slowly, or few labels or seconds are left; whether rings close it."""
@@ -243,14 +277,45 @@ class _Prover:
         z = self.energy.nearest(dual.decode())
         return self._offer(self.energy.descend(z, over=self.ends.over)[0])
 
+    def _search_if_due(self) -> bool:
+        """Whether a search finds a better field. All of them may take as long as the levels."""
+        left, spent = self.ends.deadline.left(), self.ends.deadline.clock() - self.began
+        if left == math.inf:
+            return self.hunt is None and self._search(left)
+        return self._search(min(_SEARCH * left, spent - 2 * self.searched))
+
+    def _search_on(self) -> bool:
+        """Search for the rest of the time, or for half of it and whether a better field is worth a chain."""
+        while (left := self.ends.deadline.left() - self.proven.seconds) > 0 and not self.ends.over():
+            close = self.least - self.proven.bound <= _LOOSE * self.least
+            chain = left == math.inf or (close and left > 2 * self.took)
+            if self._search(left / 2 if chain else left) and chain:
+                return True
+            if left == math.inf or not chain or self._is_tired():
+                return False
+        return False
+
+    def _is_tired(self) -> bool:
+        """Whether the search has found nothing for long."""
+        return self.hunt is not None and self.hunt.fruitless > _PATIENCE * self.energy.size
+
     def _search(self, seconds: float) -> bool:
-        """Whether a short search finds a better field."""
-        limit, starts = self.ends.deadline.within(seconds), [*self.starts, self.z]
-        hunt = IntegerSearch(self.energy, self.instance.domain.rings, starts, self.seed)
-        while hunt.round < _ROUNDS and not limit.passed() and not self.ends.over():
-            hunt.explore(lambda: limit.passed() or self.ends.over())
-        self.searched = True
-        return self._offer(hunt.best.z)
+        """Whether a search finds a better field: whole rounds, so that it goes on where it ended."""
+        clock, least = self.ends.deadline.clock, self.least
+        if self.hunt is None or self.least < self.hunt.best.total * (1 - _BETTER) - 1e-12:
+            starts = [*self.starts, self.z]
+            self.hunt = IntegerSearch(self.energy, self.instance.domain.rings, starts, self.seed)
+        begin, last = clock(), self.hunt.round + _ROUNDS if seconds == math.inf else math.inf
+
+        def over() -> bool:
+            return self.ends.over(self.proven.seconds)
+
+        while clock() < begin + seconds and self.hunt.round < last and not over() and not self._is_tired():
+            self.hunt.explore(over)
+            self._offer(self.hunt.best.z)
+            self.progress(f"search: energy {self.least:.5g} after {self.hunt.round} rounds")
+        self.searched += clock() - begin
+        return self.least < least
 
     def _offer(self, z: Ints) -> bool:
         """Whether integers are better than the best ones, which they then are."""
@@ -264,7 +329,7 @@ class _Prover:
 
         Other processors round differently, and must not find more.
         """
-        prefix, level, rows = f"level_{len(chain.levels)}_", dual.level, chain.rows
+        prefix, level, rows = f"level_{len(chain.levels)}_", dual.level, dual.level.rows
         began = self.ends.deadline.clock()
         chain.gap, most = chain.threshold - dual.bound, chain.threshold * (1 + _BETTER) + 1e-12
         numbers = dual.arrays(max(chain.gap, 1e-6 * (1 + chain.threshold)))
