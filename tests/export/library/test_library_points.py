@@ -195,7 +195,9 @@ def test_points_that_are_missing_or_damaged_are_refused(searched, tmp_path):
 def test_the_points_that_ship_are_about_the_shipped_instances():
     """No search is needed, and tiny and small instances with a proof have their certificates."""
     spec = default_spec()
-    assert sum(path.stat().st_size for path in spec.points.iterdir()) < 17_000_000
+    sizes = {path: path.stat().st_size for path in spec.points.iterdir()}
+    assert max(size for path, size in sizes.items() if path.suffix == ".npz") <= 2_000_000
+    assert sum(sizes.values()) < 28_000_000
     points = read_points(spec.points)
     for planned in plan_library(spec):
         known = points(planned.recipe.name)
