@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from ..input_limits import MAX_OUTLINE_SAMPLES
+from ..input_limits import MAX_OUTLINE_SAMPLES, MAX_SAMPLE_PAIRS
 from ..instance.angles import vector_length
 from ..instance.domain import Bools, Floats
 from .curves import evaluate_cubics, lines_as_cubics, run_numbers
@@ -268,7 +268,10 @@ def _pair_samples(samples: _OutlineSamples, width: float) -> Indices | None:
     from scipy.spatial import cKDTree
 
     at, inward, reach = samples.at, samples.inward, _UNEVEN * width
-    one, other = cKDTree(at).query_pairs(reach, output_type="ndarray").T
+    tree = cKDTree(at)
+    if tree.count_neighbors(tree, reach) > 2 * MAX_SAMPLE_PAIRS:  # a scribble, traced over and over
+        return None
+    one, other = tree.query_pairs(reach, output_type="ndarray").T
     way = at[other] - at[one]
     square = (way * way).sum(axis=1)
     ahead, behind = (inward[one] * way).sum(axis=1), -(inward[other] * way).sum(axis=1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from children import within_memory
 from crossfield.models.sketch.curves import flatten, lines_as_cubics
 from crossfield.models.sketch.pen_outlines import find_pen_strokes, find_silhouettes
 from scipy.spatial import cKDTree
@@ -200,3 +201,19 @@ def test_silhouettes_are_the_areas_that_stand_for_themselves():
     body, patch, arm = (shape(circle(radius) + at) for radius, at in ((50, 0), (10, 20), (20, [60, 0])))
     assert find_silhouettes([patch, body, arm, body]) == [1, 2]
     assert find_silhouettes([patch]) == [0]
+
+
+SCRIBBLE = """
+import numpy as np
+from crossfield.models.sketch.curves import lines_as_cubics
+from crossfield.models.sketch.pen_outlines import find_pen_strokes
+corners = np.tile([[0, 0], [12, 0], [12, 1], [0, 1.0]], (1000, 1))
+corners += np.random.default_rng(0).normal(0, 0.01, corners.shape)
+scribble = lines_as_cubics(corners, np.roll(corners, -1, axis=0))
+print(*[stroke is None for stroke in find_pen_strokes([scribble, scribble[:40]])])
+"""
+
+
+def test_a_scribble_traced_a_thousand_times_is_an_area(tmp_path):
+    """Its 26,000 samples lie within a few widths of each other: hundreds of millions of pairs."""
+    assert within_memory(SCRIBBLE, tmp_path).split() == ["True", "False"]
