@@ -19,9 +19,7 @@ MAX_LAYERS: Final = 5000  # clips, masks and opacities, each as a share of the p
 MAX_DATA: Final = 10_000_000  # characters of path data, point lists, styles and transforms of elements
 MAX_CURVES: Final = 500_000  # segments of all shapes, counting every repetition by `use`
 MAX_OUTLINE_SAMPLES: Final = 2_000_000  # samples of the outlines of all shapes that are only filled
-MAX_SAMPLE_PAIRS: Final = (
-    8_000_000  # pairs of near samples of an outline; a shape with more counts as an area
-)
+MAX_SAMPLE_PAIRS: Final = 8_000_000  # pairs of near samples of an outline; with more it counts as an area
 MAX_LENGTH: Final = 64  # characters of a length or a colour
 MAX_TRANSFORM: Final = 1000  # characters of a transform
 LEAST_LENGTH: Final = 1e-9  # width and height of a page: the quotient of two smaller lengths is not finite

@@ -82,12 +82,11 @@ class SketchOptions:
         return self.silhouette != "none" or bool(self.curvature) or self.view is not None
 
     def read(self, source: str, command: str, *, mesh: MeshOptions = _PLAIN, quiet: bool = False) -> Instance:
-        """Instance of a sketch or mesh file, a sample or an instance file, small enough for the memory.
+        """Instance of a sketch or mesh file, a sample or an instance file.
 
         Prints the warnings of the reader unless quiet. Raises DomainError for a domain that the command does
         not take, InputError, and InstanceError for a weight that is out of range.
         """
-        from ...models.memory import check_memory
         from ...models.mesh.read import read_mesh
         from ...models.mesh.shapes import MESHES
 
@@ -103,8 +102,6 @@ class SketchOptions:
             instance = self._read_instance(path)
         else:
             instance = read_mesh(path, **asdict(mesh)) if is_mesh else self._read_drawing(path)
-        if is_saved or is_mesh:
-            check_memory(instance.domain.size, instance.domain.kind)
         with naming(path):
             check_domain(instance, command)
         instance = instance.with_weights(stroke_weight=self.stroke_weight)

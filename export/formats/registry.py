@@ -20,6 +20,7 @@ from ...models.field.field import CrossField
 from ...models.formulations.families import ANY_DEGREE
 from ...models.formulations.problem import Problem, with_products_lifted
 from ...models.instance.domain import Floats
+from ...models.memory import check_memory
 from ..writing.canonical import CanonicalForm
 from ..writing.sink import is_packed, pending_file
 
@@ -219,7 +220,7 @@ def write(
     UnsupportedByFormatError
         If the format cannot carry the problem, or has no place for the start.
     InputError
-        For an unknown suffix or dialect.
+        For an unknown suffix or dialect, and for more pixels or faces than the memory holds.
     OutputError
         If a file cannot be written.
 
@@ -238,6 +239,8 @@ def write(
             "write_problem, which writes a start file for each solver",
             file=path,
         )
+    domain = problem.instance.domain
+    check_memory(domain.size, "written", domain.kind)
     held = problem_in_format(problem, entry)
     form = CanonicalForm(held)
     point = None if start is None else held.point(start)

@@ -112,7 +112,7 @@ def fit_frame(box: Box, size: int, *, margin: bool) -> Frame:
         min(size, max(1, int(np.ceil((side + 2 * border) / pixel - 1e-6))))
         for side in (right - left, bottom - top)
     )
-    check_memory(height * width)
+    check_memory(height * width, "read")
     return Frame(
         (left + right - width * pixel) / 2, (top + bottom - height * pixel) / 2, pixel, height, width
     )

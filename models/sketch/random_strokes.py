@@ -74,7 +74,7 @@ def random_instance(
     """
     check_size(size)
     _check_options(seed, share, mask_share)
-    check_memory(size * size)
+    check_memory(size * size, "read")
     rng = np.random.Generator(np.random.PCG64(seed))
     mask = np.ones((size, size), dtype=bool)
     if mask_share < 1:

@@ -1,25 +1,84 @@
-"""Free memory as Linux states it."""
+"""Free memory as Linux, control groups and limits of the process state it, and what it is compared with."""
 
 import sys
 
+import crossfield as cf
+import numpy as np
 import pytest
-from crossfield.models import memory
+from children import within_memory
 from crossfield.models.errors import InputError
-from crossfield.models.memory import available_memory
+from crossfield.models.memory import available_memory, check_memory, free_in_groups
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the system does not state what is free")
+GIGABYTE = 1_000_000_000
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the system does not state what is free")
 def test_this_machine_states_what_is_free():
     assert 1 << 20 < available_memory() < 1 << 50
 
 
-def test_grids_larger_than_memory_are_refused_with_the_estimate(monkeypatch):
-    free = 8_000_000_000
-    monkeypatch.setattr(memory, "available_memory", lambda: free)
-    memory.check_memory(128 * 128)
-    with pytest.raises(
-        InputError, match=r"a grid of 16777216 pixels needs about 83.9 GB to be written, but 8.0 GB are free"
-    ):
-        memory.check_memory(4096 * 4096)
-    monkeypatch.setattr(memory, "available_memory", lambda: None)
-    memory.check_memory(4096 * 4096)
+@pytest.mark.parametrize("points, act", [(10**12, "read"), (10**11, "written")])
+def test_more_than_any_machine_has_is_refused_with_the_estimate(points, act):
+    check_memory(128 * 128, act)
+    with pytest.raises(InputError, match=rf"of {points} pixels needs about 150000.0 GB to be {act}, but"):
+        check_memory(points, act)
+
+
+def group(folder, names, most, used, facts):
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, value in zip(names, (most, used), strict=True):
+        (folder / f"memory.{name}").write_text(f"{value}\n")
+    (folder / "memory.stat").write_text(facts)
+
+
+def test_limits_of_both_versions_of_control_groups_are_known(tmp_path):
+    """The limits of groups around a group hold too; caches of files are given up when memory is short."""
+    second = ("max", "current")
+    group(tmp_path / "a", second, 4 * GIGABYTE, 3 * GIGABYTE, f"anon 7\ninactive_file {GIGABYTE}\n")
+    group(tmp_path / "a" / "b", second, "max", GIGABYTE, "anon 7\n")
+    assert list(free_in_groups("0::/a/b\n", tmp_path)) == [2 * GIGABYTE]
+    assert list(free_in_groups("0::/../../of/the/host\n", tmp_path / "a")) == [2 * GIGABYTE]
+    first = ("limit_in_bytes", "usage_in_bytes")
+    facts = "inactive_file 5\ntotal_inactive_file 7\n"
+    group(tmp_path / "memory" / "c", first, 4 * GIGABYTE, GIGABYTE, facts)
+    groups = "9:name=systemd:/c\n4:cpu,memory:/c\n1:cpu:/c\n0::/none\n"
+    assert list(free_in_groups(groups, tmp_path)) == [3 * GIGABYTE + 7]
+
+
+EXPORT = """
+import crossfield as cf
+instance = cf.read_instance("million.npz")
+problem = cf.formulate(instance, "milp")
+try:
+    cf.write(problem, "million.lp")
+except cf.InputError as error:
+    print(error)
+"""
+
+
+def test_what_the_process_may_map_counts(tmp_path):
+    side = 1000
+    strokes = np.stack([np.arange(side), np.zeros(side, int)], axis=1)
+    million = cf.Instance.on_pixels("m", np.ones((side, side), bool), strokes, np.zeros(side), np.ones(side))
+    cf.write_instance(million, tmp_path / "million.npz")
+    line = within_memory(EXPORT, tmp_path, 1.5)
+    assert "a grid of 1000000 pixels needs about 1.5 GB to be written, but 1." in line or "but 0." in line
+    assert not (tmp_path / "million.lp").exists()
+
+
+READ = """
+import crossfield as cf
+sketch = cf.sample("mouse", 1000)
+print(sketch.grid.size > 400_000)
+try:
+    cf.sample("mouse", 4096)
+except cf.InputError as error:
+    print(error)
+"""
+
+
+@pytest.mark.slow
+def test_a_sketch_is_read_where_it_fits_and_refused_where_not(tmp_path):
+    first, second = within_memory(READ, tmp_path).splitlines()
+    assert first == "True"
+    assert "GB to be read, but" in second

@@ -1,7 +1,6 @@
 """Bad input on the command line: exit code 1, one line that names file and reason, and no new files."""
 
 import json
-import math
 import re
 import subprocess
 import sys
@@ -13,7 +12,6 @@ import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.models.instance.symmetries import turned
-from crossfield.models.memory import available_memory
 from loops import for_each
 from PIL import Image, ImageDraw
 
@@ -156,13 +154,6 @@ def test_bad_input_is_refused(files, refused, arguments, begin, reason):
     line = refused(*command.split())
     assert line.startswith(begin)
     assert re.search(reason, line)
-
-
-def test_a_size_beyond_the_memory_is_estimated_and_refused(tmp_path, refused):
-    if (available_memory() or math.inf) > 60e9:
-        pytest.skip("this machine has memory enough for the largest grid, or does not state what it has")
-    line = refused("export", "mouse", "--size", 4096, "-o", tmp_path / "out")
-    assert re.search("GB.*choose a smaller size", line)
 
 
 def test_a_refused_format_is_reported_and_recorded(files, capsys):
