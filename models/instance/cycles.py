@@ -86,23 +86,25 @@ def grow_forest(size: int, first: Ints, second: Ints, roots: Ints | list[int]) -
 
     size: number of points. first, second: of each pair, (m,).
     """
+    from scipy.sparse import coo_array  # not needed by programs that only read and write files
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(size, size))
+    part = connected_components(graph, directed=False)[1]
     depth = np.full(size, -1, dtype=np.int32)
     pair = depth.copy()
-    depth[roots] = 0
+    numbers, first_point = np.unique(part, return_index=True)
+    depth[first_point[~np.isin(numbers, part[roots])]] = depth[roots] = 0
     open_ = np.arange(len(first), dtype=np.int32)
-    while True:
+    while len(open_):
         reached = depth[first[open_]] >= 0, depth[second[open_]] >= 0
         at = open_[reached[0] != reached[1]]
         open_ = open_[~(reached[0] & reached[1])]
-        if len(at):
-            outer = np.where(depth[first[at]] < 0, first[at], second[at])
-            outer, place = np.unique(outer, return_index=True)
-            pair[outer] = at[place]
-            depth[outer] = 1 + np.maximum(depth[first[at[place]]], depth[second[at[place]]])
-        elif (depth < 0).any():
-            depth[np.argmin(depth)] = 0
-        else:
-            return Forest(depth, pair)
+        outer = np.where(depth[first[at]] < 0, first[at], second[at])
+        outer, place = np.unique(outer, return_index=True)
+        pair[outer] = at[place]
+        depth[outer] = 1 + np.maximum(depth[first[at[place]]], depth[second[at[place]]])
+    return Forest(depth, pair)
 
 
 def _choose_rings(domain: Domain, chords: Ints, forest: Forest) -> tuple[Bools, Ints]:

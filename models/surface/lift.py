@@ -81,12 +81,11 @@ def surface(
     check_hints(all_hints, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
     heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)
-    parts_done = []
-    for number in range(1, parts + 1):
+    parts_done, all_crosses = [], Crosses.of(field)
+    for number, window in enumerate(ndimage.find_objects(part_of), 1):
         progress("surface" if parts == 1 else f"surface, part {number} of {parts}")
-        mask = part_of == number
-        window = ndimage.find_objects(mask.astype(np.int8))[0]
-        stencils, crosses = Stencils(Grid(mask[window])), Crosses.of(field).at(mask[instance.mask])
+        mask = part_of[window] == number
+        stencils, crosses = Stencils(Grid(mask)), all_crosses.at(instance.grid.number[window][mask])
         level = GridLevel(stencils, crosses, (window[0].start, window[1].start))
         part_hints = [hint for hint in all_hints if part_of[hint.row, hint.column] == number]
         z = _solve_part(level, part_hints, cut, flip=flip)

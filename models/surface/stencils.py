@@ -108,8 +108,8 @@ class Crosses:
         """The means by a matrix (k, n) whose rows add up to 1."""
         return Crosses(mean @ self.product, mean @ self.total)
 
-    def at(self, places: Bools) -> Crosses:
-        """The crosses at some places, a mask (n,)."""
+    def at(self, places: Ints) -> Crosses:
+        """The crosses at some places, their numbers (k,)."""
         return Crosses(self.product[places], self.total[places])
 
     @property
