@@ -11,14 +11,13 @@ import difflib
 import inspect
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import cache, cached_property, reduce
-from operator import add
+from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Any, Final, Literal, get_args
 
 from ..arguments import check_flag
 from ..errors import FormulationError, shortened
-from .expressions import Expression, Operand, Relation, Symbol, Term, expression_of
+from .expressions import Expression, Operand, Relation, Symbol, Term, expression_of, sum_of
 from .symbols import (
     BOUNDED,
     SLOTS,
@@ -61,7 +60,7 @@ class Family:
         """The family for cycles of so many steps alone, with a term for each step."""
         symbols = list(step_slots(steps))
         steps_along = (d * sign for d, sign in zip(symbols[:steps], symbols[steps:], strict=True))
-        expression = self.expression.substitute({d_round: reduce(add, steps_along)})
+        expression = self.expression.substitute({d_round: sum_of(steps_along)})
         return replace(self, tag=f"{self.tag}{steps}", expression=expression, steps=steps, rolled=self)
 
     @property

@@ -191,7 +191,7 @@ class Expression(Operand):
             reduce(_product, (change(*factor) for factor in term.factors), ONE) * _number(term.constant)
             for term in self.terms  # the constant last, which would be distributed over a first sum
         )
-        return reduce(add, products, ZERO)
+        return sum_of(products)
 
     def evaluate(self, values: Mapping[Symbol, Any], functions: Functions = IN_NUMPY) -> Any:
         """The value at the values of its symbols: numbers, arrays or what else has operators."""
@@ -226,7 +226,7 @@ class Expression(Operand):
             reduce(mul, (s for n, s in enumerate(symbols) if s != binary or s not in symbols[:n]), factor)
             for symbols, factor in terms.items()
         )
-        return reduce(add, products, ZERO)
+        return sum_of(products)
 
 
 @dataclass(frozen=True)
@@ -280,6 +280,11 @@ def expression_of(value: Operand | int) -> Expression:
         return _number(Constant(Fraction(value)))
     assert isinstance(value, Symbol | Function)
     return Expression((Term(_ONE, ((value, 1),)),))
+
+
+def sum_of(operands: Iterable[Operand]) -> Expression:
+    """The sum of many operands, each of which is looked at once."""
+    return _sum(term for operand in operands for term in expression_of(operand).terms)
 
 
 def _number(constant: Constant) -> Expression:
