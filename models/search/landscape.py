@@ -2,10 +2,10 @@
 
 For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H
 (models/search/energy.py). On a patch of some hundred pixels G is a small dense matrix. A jump p_e of the
-pair (i, j) that changes by d
+pair (i, j) of weight w that changes by d
 
-- moves A_e by q = d pi/2: with r = e_i - e_j on alpha, b changes by -2 q r;
-- if d is odd, turns the sign of the coupling of beta_i and beta_j: H changes in two entries by 4 (-1)^p,
+- moves A_e by q = d pi/2: with r = e_i - e_j on alpha, b changes by -2 w q r;
+- if d is odd, turns the sign of the coupling of beta_i and beta_j: H changes in two entries by 4 w (-1)^p,
   which by the formula of Woodbury changes G by a matrix of rank 2.
 
 So the gain of every change of one jump is a short formula in off-diagonal entries of G, and making a change
@@ -183,19 +183,19 @@ class Landscape:
         """The gains by the present inverse, infinite where they are impossible."""
         g, x, terms = self._inverse, self._x, self.patch.terms
         i, j, k = terms.first, terms.second, len(self.patch.pixels)
-        p = self.p[self.patch.pairs]
+        p, w = self.p[self.patch.pairs], terms.weighted(np.ones(len(i)))
         a = terms.residual_a(x, p)
         give = g[i, i] + g[j, j] - 2 * g[i, j]
         at_i, at_j = i + k, j + k
         to_i, to_j = g[at_i, i] - g[at_i, j], g[at_j, i] - g[at_j, j]
-        ii, jj, ij = g[at_i, at_i], g[at_j, at_j], g[at_i, at_j] + parity_sign(p) / 4
+        ii, jj, ij = g[at_i, at_i], g[at_j, at_j], g[at_i, at_j] + parity_sign(p) / (4 * w)
         q = HALF * STEPS[:, None]
-        y_i, y_j = x[at_i] - 2 * q * to_i, x[at_j] - 2 * q * to_j
-        # 16 (ij^2 - ii jj) is det(H + C) / det(H), of two definite matrices.
+        y_i, y_j = x[at_i] - 2 * w * q * to_i, x[at_j] - 2 * w * q * to_j
+        # 16 w^2 (ij^2 - ii jj) is det(H + C) / det(H), of two definite matrices.
         ratio = ij**2 - ii * jj
         with np.errstate(all="ignore"):
             turned = (2 * ij * y_i * y_j - jj * y_i**2 - ii * y_j**2) / ratio
-            gains: Floats = 2 * q * q * (1 - 2 * give) + 4 * q * a + turned
+            gains: Floats = w * (2 * q * q * (1 - 2 * w * give) + 4 * q * a) + turned
             believed = np.isfinite(gains) & (ratio > 0) & (gains >= -self.energy * (1 + _DRIFT) - _DRIFT)
         gains[~believed] = np.inf
         return gains
@@ -299,11 +299,11 @@ class Landscape:
         """The change of b, shape (2k,), and the change of c - 2 x'b."""
         terms, q = self.patch.terms.select(pairs), HALF * steps
         a = terms.residual_a(self._x, self.p[self.patch.pairs[pairs]])
-        push = np.zeros(len(self._x))
-        np.subtract.at(push, terms.first, 2 * q)
-        np.add.at(push, terms.second, 2 * q)
-        # c changes by the sum of 2 q^2 + 4 q (pi/2 p).
-        return push, float(np.sum(2 * q * q + 4 * q * a))
+        push, pull = np.zeros(len(self._x)), terms.weighted(2 * q)
+        np.subtract.at(push, terms.first, pull)
+        np.add.at(push, terms.second, pull)
+        # c changes by the sum of w (2 q^2 + 4 q (pi/2 p)).
+        return push, float(np.sum(terms.weighted(2 * q * q + 4 * q * a)))
 
     def _couplings(self, pairs: Ints, steps: Ints) -> tuple[Ints, Floats]:
         """The unknowns beta whose couplings turn, shape (c,), and the additions to H there, shape (c, c)."""
@@ -313,7 +313,8 @@ class Landscape:
         places, where = np.unique(ends, return_inverse=True)
         first, second = where[: len(odd)], where[len(odd) :]
         added = np.zeros((len(places), len(places)))
-        added[first, second] = added[second, first] = 4 * parity_sign(self.p[self.patch.pairs[odd]])
+        signs = turned.weighted(parity_sign(self.p[self.patch.pairs[odd]]))
+        added[first, second] = added[second, first] = 4 * signs
         return places + len(self.patch.pixels), added
 
     def _update(self, factor: float, left: Floats, right: Floats) -> None:

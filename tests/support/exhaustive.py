@@ -133,7 +133,8 @@ def terms(instance, p):
     rows = np.vstack([a, b, r, np.hstack([none, unit])])
     goal = np.concatenate([-HALF * np.asarray(p), np.zeros(len(b)), strokes.goal, np.zeros(n)])
     skew = np.full(n, instance.skew_coefficient)
-    return rows, goal, np.concatenate([np.full(2 * len(a), 2.0), strokes.weight, skew])
+    of_pair = 2.0 * (np.ones(len(a)) if instance.pair_weights is None else instance.pair_weights)
+    return rows, goal, np.concatenate([of_pair, of_pair, strokes.weight, skew])
 
 
 def windows(instance):
