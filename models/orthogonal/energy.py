@@ -28,8 +28,11 @@ from ..smooth.sparse_systems import Solve, factor_matrix
 
 MOST_DENSE: Final = 6000
 """Points up to which the inverse of the matrix is kept: 288 MB."""
-LOWER: Final = 1e-9
-"""Fall of the energy that counts: less may be rounding."""
+
+
+def lowered(total: float, share: float = 1e-9) -> float:
+    """The energy below which another one counts as lower: less by `share` of 1 + total may be rounding."""
+    return total - share * (1 + total)
 
 
 def takes_integers(instance: Instance) -> bool:
@@ -175,23 +178,30 @@ class OrthogonalEnergy:
     def descend(self, z: Ints, over: Over = never, residual: Floats | None = None) -> tuple[Ints, Floats]:
         """Change single integers, the one of greatest gain first, until none lowers the energy.
 
-        With more than 6,000 points, round all to the best angles in turn. residual: that of the best angles
-        for z, if it is known. Returns the integers and their residuals.
+        With more than 6,000 points, round all to the best angles in turn. Gains lose their digits where
+        weights differ by many orders of magnitude. So a change has to lower the energy of the residuals,
+        which always is one of some angles, and no integers come twice. residual: that of the best angles for
+        z, if it is known. Returns the integers and their residuals.
         """
         z, residual = z.copy(), self.residuals(self.fit_angles(z), z) if residual is None else residual
+        total, failed = self.total(residual), np.zeros(len(z), dtype=bool)
         while len(z) and self.size <= MOST_DENSE and not over():
-            change = self.gains(residual)
+            change = np.where(failed, 0.0, self.gains(residual))
             row = np.argmin(change, keepdims=True).astype(np.int32)
-            if change[row[0]] > -LOWER:
+            if total + change[row[0]] >= lowered(total):
                 break
             step = np.where(residual[row] > 0, -1, 1).astype(np.int32)
-            z[row] += step
-            residual = self.step_residuals(residual, row, step)
+            moved = self.step_residuals(residual, row, step)
+            failed[row] = self.total(moved) >= lowered(total)
+            if not failed[row]:
+                z[row] += step
+                residual, total, failed[:] = moved, self.total(moved), False
         while self.size > MOST_DENSE and not over():
             nearest = z - np.round(np.round(residual / HALF, 9)).astype(np.int32)
-            if (nearest == z).all():
+            moved = self.residuals(self.fit_angles(nearest), nearest)
+            if self.total(moved) >= lowered(total):
                 break
-            z, residual = nearest, self.residuals(self.fit_angles(nearest), nearest)
+            z, residual, total = nearest, moved, self.total(moved)
         return z, residual
 
 

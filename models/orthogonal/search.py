@@ -16,7 +16,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from ..instance.angles import HALF
 from ..instance.domain import Floats, Ints, Rings
 from ..processes.deadline import Over
-from .energy import LOWER, MOST_DENSE, OrthogonalEnergy
+from .energy import MOST_DENSE, OrthogonalEnergy, lowered
 
 _KICKS: Final = 500  # perturbations per round
 _TIRED: Final = 1  # perturbations per point without success after which the search begins again
@@ -57,13 +57,13 @@ class IntegerSearch:
         """Try 500 perturbations, with more than 6,000 points within 1,500 of them; return early if over."""
         rng = np.random.default_rng((self._seed, self.round))
         if self._moves is None:
-            point = self._explore_patch(rng, over)
+            point = self._explore_patch(rng, over) if len(self.best.z) else self.best
         else:
             if self._tired > _TIRED * self._energy.size:
                 self._present, self._tired = self._begin_again(rng, over), 0
             point = self._moves.lower(self._present, rng, over)
-        self._tired = 0 if point.total < self._present.total - LOWER else self._tired + _KICKS
-        self.fruitless = 0 if point.total < self.best.total - LOWER else self.fruitless + _KICKS
+        self._tired = 0 if point.total < lowered(self._present.total) else self._tired + _KICKS
+        self.fruitless = 0 if point.total < lowered(self.best.total) else self.fruitless + _KICKS
         self._present = point
         self.best = self.best if self.fruitless else point
         self.round += not over()
@@ -77,7 +77,7 @@ class IntegerSearch:
     def _explore_patch(self, rng: np.random.Generator, over: Over) -> Point:
         """Explore the points nearest to a row, alternately a random one and one of high energy."""
         energy, (z, residual, total) = self._energy, self._present
-        share = energy.weight * residual**2 / total if self.round % 2 and total > LOWER else None
+        share = energy.weight * residual**2 / total if self.round % 2 and lowered(total) > 0 else None
         row = rng.choice(len(z), p=share)
         near = breadth_first_order(energy.links, energy.first[row], directed=False)[0][:_PATCH]
         patch, rows = energy.restrict(near, energy.fit_angles(z))
@@ -110,7 +110,7 @@ class _Moves:
             start = self.perturb(rng, point.z, point.residual) if kick else point[:2]
             z, residual = self._energy.descend(start[0], over, start[1])
             total = self._energy.total(residual)
-            if total < point.total - LOWER:
+            if total < lowered(point.total):
                 point = Point(z, residual, total)
         return Point.of(self._energy, point.z)  # rounding of many steps must not accumulate
 

@@ -34,7 +34,7 @@ from .integer_fields import finish_field, starting_integers
 from .landscape import FieldPoint
 from .nearest_stroke import nearest_strokes
 from .starts import polyvector_start, rounded_energy, start_fields
-from .walk import LOWER, PatchResult, PatchTask, explore
+from .walk import PatchResult, PatchTask, below, explore
 
 Explorers = Callable[[list[PatchTask]], list[PatchResult]]
 """Explores patches in parallel and returns the results in the order of the tasks."""
@@ -308,7 +308,7 @@ class _Hunt:
             if better is not None and better.energy < at.energy:
                 at.x, at.p = np.clip(better.x, *self._bounds), better.p
         best = min(self._apart, key=lambda at: at.energy)
-        if best.energy < self._state.energy - LOWER:
+        if best.energy < below(self._state.energy):
             self._state = FreeField(self._instance, best.alpha, best.beta, best.p)
             self._unsettled, self.fruitless = True, 0
             self.energies.append((self.round, best.energy))
@@ -321,11 +321,11 @@ class _Hunt:
         )
         inside = np.concatenate([task.free, task.free])
         trial.x = np.clip(np.where(inside, better.x, state.x), *self._bounds)
-        if not self.is_large and trial.energy >= state.energy - LOWER:
+        if not self.is_large and trial.energy >= below(state.energy):
             # Other patches were adopted in the same place: the angles for all new jumps are neither's.
             trial.x = state.x
             settle(trial, self._solver, over)
-        if trial.energy < state.energy - LOWER:
+        if trial.energy < below(state.energy):
             self._state, self._unsettled, self.fruitless = trial, True, 0
             self.energies.append((self.round, trial.energy))
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
+from ..orthogonal.energy import lowered
 from ..processes.deadline import Deadline, Over
 from ..smooth.sparse_systems import one_thread
 from .box_qp import field_at
@@ -27,8 +28,8 @@ from .landscape import STEPS, FieldPoint, Landscape, Patch
 Change = tuple[Ints, Ints]
 """Local numbers of pairs of a patch, each at most once, and the steps that are added to their jumps."""
 
-LOWER: Final = 1e-7  # energy by which a field has to be lower to count as better: less may be rounding
 
+_LOWER: Final = 1e-7  # fall of the energy that counts, relative to 1 + energy
 _FRUITLESS: Final = 4  # changes of one jump without a new lowest point that end a walk
 _FRUITLESS_TURNS: Final = 12  # turns of one stroke
 _PLAIN: Final = 4  # perturbations before each walk of turns
@@ -38,6 +39,11 @@ _LONGEST: Final = 16  # quads of a path
 _WIDEST: Final = 12.0  # pixels, radius of a disc
 _TURNS: Final = 0.6  # share of turns
 _SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a quad on its counter-clockwise walk
+
+
+def below(energy: float) -> float:
+    """The energy below which a field of a walk counts as lower than one of `energy`: less may be rounding."""
+    return lowered(energy, _LOWER)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +61,7 @@ class PatchTask:
 
 
 class PatchResult(NamedTuple):
-    """The point of least energy, with the task's values outside the patch; None if none was 1e-7 lower.
+    """The point of least energy, with the task's values outside the patch; None if none was lower.
 
     complete: whether all perturbations were tried; if not, the point depends on the clock.
     """
@@ -85,8 +91,8 @@ def _explore(task: PatchTask, over: Over) -> PatchResult:
         if number % _PLAIN == 0 and len(patch.strokes):
             trials.append(partial(_walk_of_turns, turning))
         for trial in trials:
-            lower = _lower_landscape(land, trial, home.energy - LOWER, over)
-            if lower is not None and lower.point.energy < least - LOWER:
+            lower = _lower_landscape(land, trial, below(home.energy), over)
+            if lower is not None and lower.point.energy < below(least):
                 land, home, best = lower, lower.save_state(), lower.point
                 least = best.energy
             elif over():
@@ -132,7 +138,7 @@ def _walk(
     fruitless = 0
     for now in range(1, _MOST_STEPS + 1):
         gains = land.turn_gains()[None] if turning else land.gains()
-        barred = (resting >= now) & (land.energy + gains >= low - LOWER)
+        barred = (resting >= now) & (land.energy + gains >= below(low))
         gains[barred] = np.inf
         row, place = np.unravel_index(np.argmin(gains), gains.shape)
         if np.isinf(gains[row, place]) or over():
@@ -143,10 +149,10 @@ def _walk(
             land.change(np.array([place]), STEPS[[row]])
         resting[place] = now + rng.integers(*_REST)
         fruitless += 1
-        if land.energy < low - LOWER:
+        if land.energy < below(low):
             low, fruitless = land.energy, 0
         if land.energy < goal:
-            goal, jumps = land.energy - LOWER, land.p.copy()
+            goal, jumps = below(land.energy), land.p.copy()
         if fruitless == (_FRUITLESS_TURNS if turning else _FRUITLESS):
             break
     return jumps
