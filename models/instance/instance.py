@@ -381,6 +381,33 @@ class Instance(Pictured):
         """Greatest useful jump of each pair, shape (m,)."""
         return self._jump_range[1]
 
+    def moved(self, grid: Grid, origin: Ints) -> Instance:
+        """Return the instance on another grid whose pixel k is the pixel origin[k] of this one.
+
+        Strokes and weights of pairs move with their pixels, and directions stay, unlike in a replacement of
+        the domain. Neighbours on the other grid have to be neighbours on this one. origin: (k,).
+        """
+        number = np.full(self.grid.size, -1, dtype=np.int32)
+        number[origin] = np.arange(len(origin), dtype=np.int32)
+        at, weights = number[self.stroke_index], self.pair_weights
+        order = np.argsort(at)[np.count_nonzero(at < 0) :]
+        if weights is not None:
+
+            def key(one: Ints, other: Ints) -> Any:
+                return np.minimum(one, other) * np.int64(self.grid.size) + np.maximum(one, other)
+
+            keys, moved = key(self.grid.first, self.grid.second), key(origin[grid.first], origin[grid.second])
+            by_key = np.argsort(keys)
+            weights = weights[by_key[np.searchsorted(keys, moved, sorter=by_key)]]
+        return replace(
+            self,
+            domain=grid,
+            stroke_index=at[order],
+            theta=self.theta[order],
+            w=self.w[order],
+            pair_weights=weights,
+        )
+
     def with_gauge(self, gauge: Gauge) -> Instance:
         """Return the same instance under another gauge. Raises InstanceError for an unknown one."""
         return replace(self, gauge=gauge)

@@ -8,7 +8,7 @@ docs/proofs.md has the theorem. A reader may take the modules in this order:
   cells that are left, and their boxes);
 - the search for the optimum: `descent` (level after level), `rounding` (fields from the dual), `last_step`
   (pieces of the last boxes), `absolute_descent` (the same for absolute values), `prove` (the function for
-  users), `stroked_parts` (the parts of a mask that count), `compiling`;
+  users), `compiling`;
 - what stays: `record` (a proof in memory), `certificate` and `encoding` (in a file), `check_certificate` (its
   checker, which uses nothing else), `tightening` (the bounds of variables that it leaves).
 """

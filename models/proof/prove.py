@@ -18,6 +18,7 @@ from ..processes.deadline import Deadline, Progress, Stop, silent, stop_function
 from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
 from ..processes.process_groups import are_interrupts_caught, catch_interrupts
+from ..search.stroked_parts import extended, restricted, stroked_parts
 from ..smooth.sparse_systems import one_thread
 from .absolute_descent import AbsoluteDescent
 from .certificate import REFUSALS, check_proof
@@ -27,7 +28,6 @@ from .orthogonal import prove_orthogonal
 from .orthogonal_certificate import OrthogonalProof
 from .orthogonal_certificate import check_proof as check_orthogonal_proof
 from .record import Proof
-from .stroked_parts import extended, restricted, stroked_parts
 
 _AnyProof = TypeVar("_AnyProof", Proof, OrthogonalProof)
 

@@ -2,7 +2,8 @@
 
 The smooth energy of a field is the same on both grids: differences between neighbours double, and there is a
 quarter of the pairs. So the weights of strokes and of beta, which are sums over pixels, become four times
-as large, up to the greatest weight of an instance.
+as large, up to the greatest weight of an instance. Pairs have equal weights on the coarse grid, whose field
+is a start that the fine grid judges.
 """
 
 from __future__ import annotations
@@ -42,6 +43,7 @@ def halve_resolution(instance: Instance) -> Instance | None:
         stroke_index=grid.number.ravel()[aligned],
         theta=np.arctan2(turn[1][aligned], turn[0][aligned]) / 2,
         w=weight[aligned] / 4,
+        pair_weights=None,
         stroke_coefficient=min(4 * instance.stroke_coefficient, MOST_WEIGHT),
         skew_coefficient=min(4 * instance.skew_coefficient, MOST_WEIGHT),
     )

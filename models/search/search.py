@@ -32,8 +32,8 @@ from .energy import LinearSolver
 from .improvement import pixel_curves, settle
 from .integer_fields import finish_field, starting_integers
 from .landscape import FieldPoint
-from .nearest_stroke import nearest_strokes
 from .starts import polyvector_start, rounded_energy, start_fields
+from .stroked_parts import extended, restricted, stroked_parts
 from .walk import PatchResult, PatchTask, below, explore
 
 Explorers = Callable[[list[PatchTask]], list[PatchResult]]
@@ -142,14 +142,15 @@ def search(
         closing = _closing_limit(deadline)
         if takes_integers(instance):
             return _search_integers(instance, seed, start, ends, progress)
-        hunt = _Hunt(instance, seed, _starts(instance, start, ends))
-        alone = instance.grid.size <= _ALONE or deadline.left() < _HURRY
+        part = stroked_parts(instance)  # the others are constant and cost nothing
+        hunt = _Hunt(part, seed, _starts(part, None if start is None else restricted(start, part), ends))
+        alone = part.grid.size <= _ALONE or deadline.left() < _HURRY
         try:
             with parallel_map(explore, 1 if alone else jobs) as explorers:
                 ended = hunt.run(explorers, ends, progress)
         except KeyboardInterrupt:
             ended = "interrupted"
-        return Search(hunt.best(closing()), hunt.round, tuple(hunt.energies), ended)
+        return Search(extended(hunt.best(closing()), instance), hunt.round, tuple(hunt.energies), ended)
 
 
 def _search_integers(
@@ -229,8 +230,6 @@ class _Hunt:
         self._bounds = stroke_bounds(instance)
         self._solver = LinearSolver()
         self._unsettled = False
-        # Parts without a stroke are constant and cost nothing.
-        self._reached = nearest_strokes(instance) >= 0
         self._curve = pixel_curves(instance)
 
     def best(self, over: Over) -> CrossField:
@@ -282,13 +281,13 @@ class _Hunt:
         """The patches of a round, alternately around pixels of high energy and others."""
         grid = self._instance.grid
         if not self.is_large:
-            yield from [self._reached] * _PATCHES
+            yield from [np.ones(grid.size, dtype=bool)] * _PATCHES
             return
         high = self._state.field.pixel_energy + 1e-12
         for number in range(_PATCHES):
             centre = rng.choice(grid.size, p=high / high.sum() if number % 2 else None)
             away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
-            yield (away <= np.partition(away, _PATCH)[_PATCH]) & self._reached
+            yield away <= np.partition(away, _PATCH)[_PATCH]
 
     def _adopt_results(self, tasks: list[PatchTask], points: list[FieldPoint | None], over: Over) -> None:
         """Adopt lower points, the lowest first, and update the whole grid now and then."""

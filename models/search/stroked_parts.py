@@ -1,4 +1,4 @@
-"""The parts of a mask that have a stroke, which are all that a proof is about.
+"""The parts of a mask that have a stroke, which are all that a search or a proof is about.
 
 A part (4-connected) without strokes has the least possible cost, zero, where all its crosses are equal and
 beta is 0. So the optimum is that of the other parts, and a lower bound of their energy is one of the whole.
@@ -20,8 +20,7 @@ def stroked_parts(instance: Instance) -> Instance:
     parts = ndimage.label(instance.mask)[0]
     numbers = parts[instance.mask][instance.stroke_index]
     grid = replace(instance.grid, mask=np.isin(parts, numbers))
-    row, column = instance.stroke_pixels.T
-    return replace(instance, domain=grid, stroke_index=grid.number[row, column])
+    return instance.moved(grid, np.flatnonzero(grid.mask[instance.mask]))
 
 
 def restricted(field: CrossField, part: Instance) -> CrossField:
