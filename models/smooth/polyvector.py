@@ -46,8 +46,9 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
     - w_beta abs(X1)^2 over pixels, which prefers right angles where nothing else counts.
 
     Near a right-angled cross along the stroke this is 16 times the energy of docs/mathematics.md, 5, with
-    hold w for the weights w. Parts without a stroke get alpha = beta = 0. Labels are moved into the windows
-    of the instance (docs/mathematics.md, 10).
+    hold w for the weights w. Parts without a stroke get alpha = beta = 0. Where crosses are orthogonal, X1 is
+    0, which gives the power field for these weights. Labels are moved into the windows of the instance
+    (docs/mathematics.md, 10).
 
     Parameters
     ----------
@@ -77,6 +78,7 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
     coefficients = _polynomials(instance, hold, tolerance)
     u, v = (HALF * np.round(line / HALF, _DECIMALS) for line in roots(*coefficients))
     alpha, beta = label_of(u, v)
+    beta *= not instance.orthogonal  # the roots of z^2 + X0 are at right angles up to rounding
     start = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
     return start.with_best_jumps()
 
@@ -91,7 +93,7 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
         return strokes.at_points(values.real, size) + 1j * strokes.at_points(values.imag, size)
 
     alike = smoothness(instance) + sparse.diags_array(strokes.at_points(weight, size))
-    once = sums(weight * root)
+    once = sums(weight * root) * (not instance.orthogonal)
     matrix = _couple_coefficients(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
     if tolerance is not None:
