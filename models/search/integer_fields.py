@@ -44,12 +44,17 @@ def starting_integers(
     return [energy.descend(z, over)[0] for z in starts]
 
 
+def have_energies_of_fields(instance: Instance) -> bool:
+    """Whether the energy of integers is that of their field: beta is 0, and no window binds."""
+    return instance.orthogonal and instance.gauge == "strokes"
+
+
 def finish_field(instance: Instance, energy: OrthogonalEnergy, z: Ints, over: Over) -> CrossField:
     """The field of integers z (r,) in the windows; where beta is free or windows bind, best angles and jumps
     in turn.
     """
     field = field_of(instance, z, energy)
-    if instance.orthogonal and instance.gauge == "strokes":
+    if have_energies_of_fields(instance):
         return fit_in_box(field, over)
     state = FreeField.of(field)
     settle(state, LinearSolver(), over)

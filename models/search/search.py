@@ -18,7 +18,7 @@ from ..arguments import check_count
 from ..field.field import CrossField
 from ..instance.domain import Bools
 from ..instance.instance import Instance
-from ..orthogonal.energy import OrthogonalEnergy, takes_integers
+from ..orthogonal.energy import OrthogonalEnergy, lowered, takes_integers
 from ..orthogonal.search import IntegerSearch
 from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
 from ..processes.job_counts import check_jobs
@@ -30,7 +30,7 @@ from ..smooth.sparse_systems import one_thread
 from .box_qp import FreeField, stroke_bounds
 from .energy import LinearSolver
 from .improvement import pixel_curves, settle
-from .integer_fields import finish_field, starting_integers
+from .integer_fields import finish_field, have_energies_of_fields, starting_integers
 from .landscape import FieldPoint
 from .starts import polyvector_start, rounded_energy, start_fields
 from .stroked_parts import extended, restricted, stroked_parts
@@ -61,7 +61,8 @@ class Search:
     rounds
         Number of complete rounds.
     energies
-        Round and energy of every improvement.
+        Round and energy of every improvement; of the first and the best field alone where integers are
+        searched and beta is free or windows may bind, because integers then have energies of their own.
     ended
         `time`, `rounds`, `patience` (no improvement for long) or `interrupted`.
 
@@ -150,27 +151,38 @@ def search(
                 ended = hunt.run(explorers, ends, progress)
         except KeyboardInterrupt:
             ended = "interrupted"
-        return Search(extended(hunt.best(closing()), instance), hunt.round, tuple(hunt.energies), ended)
+        return _result(extended(hunt.best(closing()), instance), hunt.round, hunt.energies, ended)
 
 
 def _search_integers(
     instance: Instance, seed: int, start: CrossField | None, ends: _Ends, progress: Progress
 ) -> Search:
     """Search over the integers of orthogonal crosses, from the power field, the greedy field and `start`."""
-    closing, energy = _closing_limit(ends.deadline), OrthogonalEnergy.of(instance)
-    starts = starting_integers(instance, energy, start, ends.sooner().over)
+    closing, energy, sooner = _closing_limit(ends.deadline), OrthogonalEnergy.of(instance), ends.sooner().over
+    starts = starting_integers(instance, energy, start, sooner)
     hunt = IntegerSearch(energy, instance.domain.rings, starts, seed)
-    energies = [(0, hunt.best.total)]
+    fields, is_exact = [start] if start else [], have_energies_of_fields(instance)
+    kind = "energy" if is_exact else "energy with right angles"
+    if not is_exact:
+        fields.append(finish_field(instance, energy, hunt.best.z, sooner))
+    energies = [(0, hunt.best.total if is_exact else min(field.energy().total for field in fields))]
     while not (ended := ends.reason_to_end(hunt.round)):
         if hunt.fruitless > _PATIENCE * energy.size:
             ended = "patience"
             break
         hunt.explore(ends.over)
-        if hunt.best.total < energies[-1][1]:
+        if is_exact and hunt.best.total < energies[-1][1]:
             energies.append((hunt.round, hunt.best.total))
-        progress(f"energy {hunt.best.total:.5g} after {hunt.round} rounds")
-    field = finish_field(instance, energy, hunt.best.z, closing())
-    return Search(min(field, start or field, key=rounded_energy), hunt.round, tuple(energies), ended)
+        progress(f"{kind} {hunt.best.total:.5g} after {hunt.round} rounds")
+    fields.append(finish_field(instance, energy, hunt.best.z, closing()))
+    return _result(min(fields, key=rounded_energy), hunt.round, energies, ended)
+
+
+def _result(field: CrossField, rounds: int, energies: list[tuple[int, float]], ended: str) -> Search:
+    """The result of a search, whose last solve may lower the energy once more."""
+    if (total := field.energy().total) < lowered(energies[-1][1]):
+        energies = [*energies, (rounds, total)]
+    return Search(field, rounds, tuple(energies), ended)
 
 
 def _closing_limit(deadline: Deadline) -> Callable[[], Over]:

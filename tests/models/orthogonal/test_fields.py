@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from cases import make_instance
 from crossfield.models.instance.angles import HALF
+from crossfield.models.instance.instance import Instance
 from crossfield.models.orthogonal import greedy as greedy_module
 from crossfield.models.orthogonal import search as search_module
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, field_of
@@ -29,6 +30,7 @@ from meshes import (
     turn_corners,
 )
 from scipy.sparse.csgraph import shortest_path
+from small_meshes import random_mesh
 
 
 def shaken(mesh, seed, size=0.2):
@@ -265,3 +267,31 @@ def test_meshes_with_skew_have_fields_too():
     result = cf.search(instance, rounds=1)
     assert result.field.energy().total < orthogonal.energy().total
     assert cf.greedy_field(instance).energy().total >= result.field.energy().total - 1e-9
+
+
+@pytest.mark.parametrize("seed", [5, 13])
+def test_searches_end_where_weights_differ_by_twelve_orders_of_magnitude(seed):
+    """Gains lose their digits there; steps that only rounding calls lower must not follow each other."""
+    rng = np.random.default_rng(seed)
+    mesh = random_mesh(rng, int(rng.integers(5, 14)))
+    weights = 10 ** rng.uniform(-9, 3, len(mesh.first))
+    count = int(rng.integers(0, 5))
+    faces = np.sort(rng.choice(mesh.size, count, replace=False))
+    strokes = rng.uniform(0, np.pi, count), rng.uniform(0.1, 1, count)
+    instance = Instance.on_faces("spread", mesh, faces, *strokes, pair_weights=weights)
+    asked = []
+    result = cf.search(instance, rounds=0, stop=lambda: asked.append(None) or len(asked) > 5000)
+    assert result.ended == "rounds"
+    assert result.field.energy().total <= cf.power_field(instance).energy().total
+
+
+@pytest.mark.parametrize("orthogonal", [True, False])
+@pytest.mark.parametrize("gauge", ["strokes", "box"])
+@pytest.mark.parametrize("shape", ["hole", "box"])
+def test_a_search_reports_the_energies_of_fields(shape, gauge, orthogonal):
+    instance = make_instance(shape, gauge, orthogonal=orthogonal)
+    result = cf.search(instance, rounds=1, jobs=1, start=cf.greedy_field(instance))
+    energies = [energy for _, energy in result.energies]
+    assert energies[-1] == pytest.approx(result.field.energy().total, rel=1e-8)
+    assert energies[0] <= cf.greedy_field(instance).energy().total + 1e-9
+    assert energies == sorted(energies, reverse=True)

@@ -1,0 +1,108 @@
+"""Parts without strokes, weights of pairs, right angles: every method against smaller or scaled copies."""
+
+from dataclasses import replace
+
+import crossfield as cf
+import numpy as np
+import pytest
+from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.symmetries import mirrored, transposed, turned
+from exhaustive import assert_feasible, exact, random_field, random_instance
+
+pytestmark = pytest.mark.numeric
+
+
+def strip(width, more_columns=0, **more):
+    """22 rows of pixels, strokes in the first columns, and further columns without strokes behind a gap."""
+    mask = np.ones((22, width + 1 + more_columns), bool)
+    mask[:, width] = False
+    rng = np.random.default_rng(0)
+    at = np.argwhere(rng.random((22, width)) < 0.1)
+    theta = 0.2 * at[:, 0] + rng.normal(0, 0.1, len(at))
+    return Instance.on_pixels("strip", mask, at, theta, np.ones(len(at)), stroke_coefficient=2.0, **more)
+
+
+METHODS = {
+    "greedy": cf.greedy_field,
+    "power": cf.power_field,
+    "polyvector": cf.polyvector_field,
+    "bend": lambda instance: cf.bend_field(cf.polyvector_field(instance)),
+    "improved": lambda instance: cf.improved_field(cf.power_field(instance)),
+    "search": lambda instance: cf.search(instance, rounds=0).field,
+}
+
+
+@pytest.mark.parametrize("orthogonal", [False, True])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_part_without_strokes_changes_nothing(method, orthogonal):
+    part, whole = (METHODS[method](strip(10, columns, orthogonal=orthogonal)) for columns in (0, 20))
+    assert whole.energy().total == pytest.approx(part.energy().total, rel=1e-6)
+    assert whole.image(whole.pixel_energy)[:, 11:] == pytest.approx(np.zeros((22, 20)), abs=1e-9)
+
+
+@pytest.mark.parametrize("jobs", [1, pytest.param(2, marks=pytest.mark.slow)])
+def test_patches_lie_where_strokes_are(jobs):
+    """The part with strokes is one patch; together with the other one the grid is larger than a patch."""
+    instance = strip(3, 20)
+    assert instance.grid.size > 400
+    start = random_field(instance, 1)
+    result = cf.search(instance, rounds=1, jobs=jobs, start=start)
+    assert not result.field.image(result.field.pixel_energy, fill=0.0)[:, 4:].any()
+    assert result.field.energy().total <= cf.search(strip(3), rounds=0).field.energy().total + 1e-9
+    assert_feasible(result.field)
+
+
+def weighted(instance, factor):
+    """The instance with all weights of the energy times a factor."""
+    return replace(
+        instance,
+        pair_weights=np.full(len(instance.grid.first), factor),
+        stroke_coefficient=factor * instance.stroke_coefficient,
+        skew_coefficient=factor * instance.skew_coefficient,
+    )
+
+
+@pytest.mark.parametrize("size, rounds", [(7, 1), (60, 0)])
+def test_a_factor_of_all_weights_is_one_of_the_energy(size, rounds):
+    instance = cf.sample("saddle", size)
+    plain, scaled = (
+        cf.search(each, rounds=rounds, jobs=1).field for each in (instance, weighted(instance, 4.0))
+    )
+    assert scaled.energy().total == pytest.approx(4 * plain.energy().total, rel=1e-6)
+
+
+def random_weights(instance, seed):
+    logarithms = np.random.default_rng(seed).uniform(-2, 2, len(instance.domain.first))
+    return replace(instance, pair_weights=10**logarithms)
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 9))])
+def test_search_finds_the_optimum_over_all_jumps_of_weighted_pairs(seed):
+    instance = random_weights(random_instance(seed, shape=(2, 3), strokes=6), seed)
+    instance = replace(instance, stroke_coefficient=0.01)  # no window binds
+    energy = cf.search(instance, rounds=1, jobs=1).field.energy().total
+    assert energy == pytest.approx(exact(instance), rel=1e-6)
+
+
+@pytest.mark.parametrize("move", [turned, mirrored, transposed])
+def test_weights_move_with_their_pairs(move):
+    instance = random_weights(random_instance(3, shape=(2, 3)), 1)
+    assert exact(move(instance)) == pytest.approx(exact(instance), rel=1e-9)
+    back = move(move(move(move(instance))))
+    assert back.sha256 == instance.sha256
+
+
+def test_files_of_fixed_jumps_are_written_for_a_large_grid_with_weights(tmp_path):
+    instance = random_weights(cf.sample("saddle", 60), 0)
+    assert instance.grid.size > 1024
+    cf.write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["lp"])
+    assert list(tmp_path.glob("*.lp"))
+
+
+@pytest.mark.parametrize("gauge", ["strokes", "box"])
+def test_the_polyvector_field_of_right_angles_is_the_power_field(gauge):
+    instance = replace(cf.sample("mouse", 20), orthogonal=True, gauge=gauge)
+    polyvector, power = cf.polyvector_field(instance), cf.power_field(instance)
+    assert not polyvector.beta.any()
+    assert np.array_equal(polyvector.p, power.p)
+    assert polyvector.alpha == pytest.approx(power.alpha, abs=1e-7)
