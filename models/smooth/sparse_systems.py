@@ -21,6 +21,7 @@ Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 
 PULL: Final = 1e-9  # pull to the present values, where strokes or w_beta are missing and a system is singular
 
+_SINGULAR: Final = 1e-13  # share of a diagonal that is added where rounding has made a matrix singular
 _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution would follow rounding
 _DENSE: Final = 8  # columns of a dense block in the factors by nested dissection
 _LEAF: Final = 24  # places that are not parted
@@ -62,17 +63,21 @@ def factor_matrix(matrix: Any, order: Ints | None = None, *, pull: float = PULL)
     by minimum degree, which is better for systems where only neighbours meet.
     """
     pulled = (matrix + pull * sparse.eye_array(matrix.shape[0])).tocsc()
-    with one_thread():
-        # A definite matrix needs no pivots, so the ordering keeps the factors sparse. In the sparse factors
-        # by minimum degree, dense blocks of several columns would mostly hold zeros.
-        factors = splu(
-            pulled if order is None else pulled[order][:, order],
-            permc_spec="MMD_AT_PLUS_A" if order is None else "NATURAL",
-            diag_pivot_thresh=0.0,
-            relax=1 if order is None else _DENSE,
-            panel_size=1 if order is None else _DENSE,
-            options={"SymmetricMode": True},
-        )
+    try:
+        with one_thread():
+            # A definite matrix needs no pivots, so the ordering keeps the factors sparse. In the sparse
+            # factors by minimum degree, dense blocks of several columns would mostly hold zeros.
+            factors = splu(
+                pulled if order is None else pulled[order][:, order],
+                permc_spec="MMD_AT_PLUS_A" if order is None else "NATURAL",
+                diag_pivot_thresh=0.0,
+                relax=1 if order is None else _DENSE,
+                panel_size=1 if order is None else _DENSE,
+                options={"SymmetricMode": True},
+            )
+    except RuntimeError:  # singular in double precision: weights differ by 15 orders of magnitude
+        stiffer = sparse.diags_array(_SINGULAR * pulled.diagonal())
+        return factor_matrix(matrix + stiffer, order, pull=pull)
 
     def solve(right: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         with one_thread():
