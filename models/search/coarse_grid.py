@@ -14,11 +14,7 @@ from typing import Final
 import numpy as np
 
 from ..field.field import CrossField
-from ..field.jumps import step_labels
-from ..instance.angles import HALF
-from ..instance.domain import Floats, Ints
 from ..instance.instance import MOST_WEIGHT, Instance, round_to_digits
-from ..instance.terms import parity_sign
 from .box_qp import FreeField
 
 _ALIGNED: Final = 0.5  # least length of a mean double-angle vector: below, strokes that cross share the pixel
@@ -50,31 +46,7 @@ def halve_resolution(instance: Instance) -> Instance | None:
 
 
 def copy_to_fine_grid(coarse: CrossField, instance: Instance) -> FreeField:
-    """The coarse crosses and jumps on the fine grid; strokes have the label whose u is nearest to them."""
+    """The coarse crosses on the fine grid, with labels whose u is nearest to strokes, and with best jumps."""
     grid = instance.grid
     parent = coarse.instance.grid.numbers_at(grid.rows // 2, grid.columns // 2)
-    alpha, beta, at = coarse.alpha[parent], coarse.beta[parent], instance.stroke_index
-    steps = np.zeros(grid.size, dtype=np.int32)
-    steps[at] = _nearest_label(instance.target, alpha[at], beta[at])
-    return FreeField(
-        instance, *step_labels(grid, alpha, beta, _jumps_between_parents(coarse, parent, instance), steps)
-    )
-
-
-def _jumps_between_parents(coarse: CrossField, parent: Ints, instance: Instance) -> Ints:
-    """The jump between the parents of each pair, shape (m,), 0 inside one."""
-    grid, above = instance.grid, coarse.instance.grid
-    first, second = parent[grid.first], parent[grid.second]
-    upper, right = above.pair_number
-    pair = np.where(grid.upward, upper[first], right[first])
-    return np.where(first == second, 0, coarse.p[pair]).astype(np.int32)
-
-
-def _nearest_label(target: Floats, alpha: Floats, beta: Floats) -> Ints:
-    """The step k for which alpha + k pi/2 + (-1)^k beta is nearest to the target."""
-    even = 2 * np.round((target - alpha - beta) / np.pi).astype(np.int32)
-    odd = 2 * np.round((target - alpha - HALF + beta) / np.pi).astype(np.int32) + 1
-    candidates = np.stack([even, odd])
-    off = np.abs(alpha + HALF * candidates + parity_sign(candidates) * beta - target)
-    chosen: Ints = candidates[np.argmin(np.round(off, 9), axis=0), np.arange(len(target))]
-    return chosen
+    return FreeField.of(CrossField.from_lines(instance, coarse.u_angle[parent], coarse.v_angle[parent]))
