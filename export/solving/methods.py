@@ -19,7 +19,7 @@ from ...models.processes.limits import Limits
 from ...models.search.box_qp import fit_in_box
 from ...models.search.greedy import greedy_field
 from ...models.search.search import Search, search
-from ...models.search.starts import best_start, first_field, polyvector_start
+from ...models.search.starts import first_field, polyvector_start, start_fields
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from ..solutions.solution import Solution
@@ -209,7 +209,7 @@ def _find_by_proof(request: Request) -> Iterator[Candidate]:
     field = proof.field
     if request.instance.gauge == "box":
         near = field_in_windows(request.instance, field.alpha, field.beta, field.p)
-        field = best_start(request.instance, near, request.stop)
+        field = start_fields(request.instance, near, request.stop)[0]
     counts = (("levels", len(proof.levels)), ("forced_jumps", proof.forced))
     seconds = loading + proof.seconds + time.perf_counter() - begin
     yield Candidate("prove", field, seconds, None, proof.ended == "interrupted", counts, proof)

@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..arguments import check_flag, float_array, whole_numbers
 from ..errors import DomainError, InstanceError, NoStrokeError
@@ -381,7 +382,7 @@ class Instance(Pictured):
         """Greatest useful jump of each pair, shape (m,)."""
         return self._jump_range[1]
 
-    def moved(self, grid: Grid, origin: Ints) -> Instance:
+    def moved(self, grid: Grid, origin: NDArray[Any]) -> Instance:
         """Return the instance on another grid whose pixel k is the pixel origin[k] of this one.
 
         Strokes and weights of pairs move with their pixels, and directions stay, unlike in a replacement of
@@ -393,7 +394,7 @@ class Instance(Pictured):
         order = np.argsort(at)[np.count_nonzero(at < 0) :]
         if weights is not None:
 
-            def key(one: Ints, other: Ints) -> Any:
+            def key(one: NDArray[Any], other: NDArray[Any]) -> Any:
                 return np.minimum(one, other) * np.int64(self.grid.size) + np.maximum(one, other)
 
             keys, moved = key(self.grid.first, self.grid.second), key(origin[grid.first], origin[grid.second])

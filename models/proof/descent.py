@@ -32,7 +32,7 @@ from ..processes.deadline import Deadline, Over, Progress, never
 from ..processes.limits import Limits
 from ..search.improvement import improved_field
 from ..search.search import search
-from ..search.starts import best_start, polyvector_start
+from ..search.starts import polyvector_start, start_fields
 from .check_certificate import MOST_COUNT, has_forced_jump
 from .clusters import table_sizes
 from .dual import Dual
@@ -150,7 +150,7 @@ class Descent:
     @staticmethod
     def first_field(instance: Instance, _norm: Norm, start: CrossField | None, over: Over) -> CrossField:
         """The best of the first field, the user's field and, in time, the PolyVector start, each improved."""
-        return best_start(instance, start, over, polyvector_start)
+        return start_fields(instance, start, over, polyvector_start)[0]
 
     def improve_field(self, field: CrossField, over: Over = never) -> CrossField:
         """The field, with jumps and angles improved."""

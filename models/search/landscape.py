@@ -297,7 +297,7 @@ class Landscape:
 
     def _push_of(self, pairs: Ints, steps: Ints) -> tuple[Floats, float]:
         """The change of b, shape (2k,), and the change of c - 2 x'b."""
-        terms, q = self.patch.terms.select(pairs), HALF * steps
+        terms, q = self.patch.terms.select(pairs), HALF * steps.astype(np.float64)
         a = terms.residual_a(self._x, self.p[self.patch.pairs[pairs]])
         push, pull = np.zeros(len(self._x)), terms.weighted(2 * q)
         np.subtract.at(push, terms.first, pull)

@@ -144,7 +144,8 @@ def search(
         if takes_integers(instance):
             return _search_integers(instance, seed, start, ends, progress)
         part = stroked_parts(instance)  # the others are constant and cost nothing
-        hunt = _Hunt(part, seed, _starts(part, None if start is None else restricted(start, part), ends))
+        starts = start_fields(instance, start, ends.over, polyvector_start, lambda one, _: power_field(one))
+        hunt = _Hunt(part, seed, [restricted(field, part) for field in starts])
         alone = part.grid.size <= _ALONE or deadline.left() < _HURRY
         try:
             with parallel_map(explore, 1 if alone else jobs) as explorers:
@@ -217,20 +218,11 @@ class _Ends:
         return self.interrupted() or self.deadline.passed()
 
 
-def _starts(instance: Instance, start: CrossField | None, ends: _Ends) -> list[CrossField]:
-    """All starts, the lowest first."""
-    return start_fields(instance, start, ends.over, polyvector_start, _power_start)
-
-
-def _power_start(instance: Instance, _: Over) -> CrossField:
-    return power_field(instance)
-
-
 class _Hunt:
     """The present field of a search, and its next trials."""
 
     def __init__(self, instance: Instance, seed: int, starts: list[CrossField]) -> None:
-        """Begin at the first of the starts; on a small grid, explore from the others, too."""
+        """Begin at the first and lowest of the starts; on a small grid, explore from the others, too."""
         start, self._apart = starts[0], [FreeField.of(field) for field in starts]
         self.round = 0
         self.fruitless = 0

@@ -55,16 +55,6 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
     return _fuse_many(instance, over)[0].fit_in_bounds(over)
 
 
-def best_start(
-    instance: Instance,
-    start: CrossField | None,
-    over: Over,
-    *strategies: Callable[[Instance, Over], CrossField],
-) -> CrossField:
-    """The lowest-energy field that `start_fields` returns."""
-    return start_fields(instance, start, over, *strategies)[0]
-
-
 def start_fields(
     instance: Instance,
     start: CrossField | None,
@@ -73,7 +63,7 @@ def start_fields(
 ) -> list[CrossField]:
     """The first field, the given one and, in time, the others, each improved.
 
-    The lowest comes first, and of fields of equal energy only one is returned.
+    The lowest comes first, and of fields of equal energy only the first one is returned.
     """
     fields = [first_field(instance, over)]
     if start is not None:
@@ -81,11 +71,6 @@ def start_fields(
     fields.extend(
         improved_field(strategy(instance, over), stop=over) for strategy in strategies if not over()
     )
-    return distinct_by_energy(fields)
-
-
-def distinct_by_energy(fields: list[CrossField]) -> list[CrossField]:
-    """The first field of each energy, the lowest energy first."""
     by_energy = {rounded_energy(field): field for field in reversed(fields)}
     return [by_energy[energy] for energy in sorted(by_energy)]
 

@@ -28,8 +28,10 @@ from .landscape import STEPS, FieldPoint, Landscape, Patch
 Change = tuple[Ints, Ints]
 """Local numbers of pairs of a patch, each at most once, and the steps that are added to their jumps."""
 
+below: Final = partial(lowered, share=1e-7)
+"""The energy below which a field of a walk counts as lower than one of the given energy."""
 
-_LOWER: Final = 1e-7  # fall of the energy that counts, relative to 1 + energy
+
 _FRUITLESS: Final = 4  # changes of one jump without a new lowest point that end a walk
 _FRUITLESS_TURNS: Final = 12  # turns of one stroke
 _PLAIN: Final = 4  # perturbations before each walk of turns
@@ -39,11 +41,6 @@ _LONGEST: Final = 16  # quads of a path
 _WIDEST: Final = 12.0  # pixels, radius of a disc
 _TURNS: Final = 0.6  # share of turns
 _SIDES: Final = (1, 1, -1, -1)  # signs of the pairs of a quad on its counter-clockwise walk
-
-
-def below(energy: float) -> float:
-    """The energy below which a field of a walk counts as lower than one of `energy`: less may be rounding."""
-    return lowered(energy, _LOWER)
 
 
 @dataclass(frozen=True, eq=False)
