@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
+from scipy import sparse
+from scipy.sparse.csgraph import connected_components
 
 from ..field.field import CrossField
 from ..instance.instance import Instance
@@ -17,10 +18,13 @@ from ..instance.instance import Instance
 
 def stroked_parts(instance: Instance) -> Instance:
     """The instance on those parts of its mask alone that have a stroke."""
-    parts = ndimage.label(instance.mask)[0]
-    numbers = parts[instance.mask][instance.stroke_index]
-    grid = replace(instance.grid, mask=np.isin(parts, numbers))
-    return instance.moved(grid, np.flatnonzero(grid.mask[instance.mask]))
+    grid = instance.grid
+    links = sparse.csr_array((np.ones(len(grid.first)), (grid.first, grid.second)), shape=(grid.size,) * 2)
+    part = connected_components(links, directed=False)[1]
+    kept = np.isin(part, part[instance.stroke_index])
+    mask = np.zeros_like(grid.mask)
+    mask[grid.rows[kept], grid.columns[kept]] = True
+    return instance.moved(replace(grid, mask=mask), np.nonzero(kept)[0])
 
 
 def restricted(field: CrossField, part: Instance) -> CrossField:
