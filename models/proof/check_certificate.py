@@ -435,13 +435,8 @@ def terms_with_strokes(
 
     at: the stroke pixels. All levels are about these pixels alone, numbered anew.
     """
-    held = np.zeros(len(terms.white), bool)
-    held[at] = True
-    count = -1
-    while count != int(held.sum()):
-        count = int(held.sum())
-        joined = held[terms.first] | held[terms.second]
-        held[terms.first[joined]] = held[terms.second[joined]] = True
+    part = parts_of(len(terms.white), terms.first, terms.second)
+    held = np.isin(part, part[at])
     pixels, pairs, anew = np.flatnonzero(held), np.flatnonzero(held[terms.first]), np.cumsum(held) - 1
     slope = np.zeros(len(pixels))
     if terms.norm != 2:
@@ -450,6 +445,18 @@ def terms_with_strokes(
     ends = anew[terms.first[pairs]], anew[terms.second[pairs]]
     strokes = terms.weight[pixels], terms.theta[pixels], slope, terms.lower[pixels]
     return EnergyTerms(terms.norm, *ends, terms.white[pixels], *strokes, terms.w_beta), pixels, pairs
+
+
+def parts_of(count: int, first: Array, second: Array) -> Array:
+    """The least point of the connected part of each of so many points. first, second (m,): ends of pairs."""
+    part, before = np.arange(count), np.full(count, -1)
+    while (part != before).any():
+        before = part.copy()
+        least = np.minimum(before[first], before[second])
+        np.minimum.at(part, before[first], least)
+        np.minimum.at(part, before[second], least)
+        part = part[part]  # few rounds, because whole parts are joined
+    return part
 
 
 def sliver_slack(weight: Array, w_beta: float, levels: int) -> float:

@@ -35,6 +35,7 @@ MOST_LEVELS, MOST_DIVISIONS = 64, 10_000  # of a certificate; cells of a quarter
 STRIDE = 4 * MOST_DIVISIONS  # between keys of labels of two points
 MOST_MEMORY = 1 << 33  # bytes for a level, of whatever file
 MORE_ROOM = 1 << 11  # bytes of memory for each byte of a file: more than for other crosses
+MOST_WORK = 8  # times as much memory for all levels together, if each had its own
 MOST_RING = 64  # pairs of a ring
 MOST_TABLES = 1 << 22  # of a level: sums of so many 32-bit numbers are exact in 64-bit floats
 MOST_FORESTS = 8  # of a level
@@ -121,14 +122,10 @@ class CentredRows:
 
     def _fixed_points(self) -> Array:
         """The ground and the first point of each part that no row of weight joins to it."""
-        first, second = self.first[self.weight > 0], self.second[self.weight > 0]
-        number = np.append(np.arange(1, self.size + 1), 0)
-        part, before = number, number + 1
-        while (part != before).any():
-            before, part = part, part.copy()
-            np.minimum.at(part, first, before[second])
-            np.minimum.at(part, second, before[first])
-        return np.asarray(part == number)
+        ground, joined = self.size, self.weight > 0
+        part = base.parts_of(ground + 1, self.first[joined], self.second[joined])
+        points = np.arange(ground + 1)
+        return np.asarray((points == ground) | ((points == part) & (part != part[ground])))
 
 
 def memory_of_instance(arrays: dict[str, Array]) -> int:
@@ -511,7 +508,7 @@ def check_arrays(
     rows = CentredRows(arrays, limit, memory)
     energy, error, same = energy_of(arrays, rows)
     threshold = base.number_in(head, "threshold", energy + error, math.inf)
-    level, bounds, squares = first_level(rows, divisions[0]), list[float](), np.zeros(0, bool)
+    level, bounds, squares, work = first_level(rows, divisions[0]), list[float](), np.zeros(0, bool), 0
     for number, count in enumerate(divisions):
         if number:
             base.require(count in (level.divisions, 3 * level.divisions), "divisions", "grows otherwise")
@@ -521,6 +518,10 @@ def check_arrays(
             stored[:size] &= np.unpackbits(packed, count=size).astype(bool)
             base.require(stored | ~squares, f"level {number}", "does not cover what the level before leaves")
             level = next_level(level, stored, count // level.divisions)
+        work += level_memory(rows, np.diff(level.squares.start))
+        base.check_format(
+            work <= MOST_WORK * rows.memory, "has larger levels than a file of its size may have"
+        )
         excess = Excess(level, costs_of(level), *stored_shares(arrays, number, level))
         bounds.append(excess.bound)
         forests = base.take_array(arrays, f"level_{number}_forests", "<i4", None, None)

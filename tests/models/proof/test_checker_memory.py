@@ -145,6 +145,19 @@ def test_a_small_orthogonal_certificate_cannot_ask_for_much_memory(count, divisi
         read_certificate(path)
 
 
+def test_many_large_levels_in_a_small_file_are_refused():
+    levels, arrays = 20, orthogonal_pixels(2, 300)
+    of_level = {name.removeprefix("level_0_"): arrays[name] for name in arrays if name.startswith("level_0_")}
+    of_level["squares"] = np.packbits(np.ones(300 * 300, bool))
+    arrays |= {"divisions": np.full(levels, 300, np.int32)}
+    arrays |= {f"level_{k}_{name}": array for k in range(levels) for name, array in of_level.items()}
+    rows = check_orthogonal.CentredRows(arrays)
+    of_one = check_orthogonal.level_memory(rows, np.array([300, 300, 1]))
+    assert len(check_orthogonal.check_arrays(arrays, memory=3 * of_one).levels) == levels
+    with pytest.raises(check_certificate.UnreadableError, match="larger levels than a file of its size may"):
+        check_orthogonal.check_arrays(arrays, memory=2 * of_one)
+
+
 @pytest.mark.parametrize("count, divisions", [(2, 1200), (60, 100), (1500, 15)])
 def test_an_orthogonal_level_takes_no_more_memory_than_is_allowed(count, divisions, tmp_path):
     path = tmp_path / "it.npz"
