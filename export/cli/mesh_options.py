@@ -29,8 +29,8 @@ class MeshOptions:
         typer.Option(
             "--sharp",
             metavar="DEGREES",
-            help="Strokes along the edges of a mesh whose faces meet at this angle or more, from 0 (flat) to"
-            " 180; by default only boundaries, and the polylines of an .obj, are strokes.",
+            help="Strokes along the edges of a mesh whose faces meet at this angle or more, above 0 (flat),"
+            " up to 180; by default only boundaries, and the polylines of an .obj, are strokes.",
         ),
     ] = None
     directions: Annotated[

@@ -291,8 +291,8 @@ SkewWeight = Annotated[
     typer.Option(
         "--skew-weight",
         metavar="X",
-        help="Weight of the skew beta, 0 to {most weight}, the same on every grid; by default"
-        " {skew weight}, or the weight in the instance file.",
+        help="Weight of the skew beta, 0 to {most weight} (to less on grids below 24 pixels), the same on"
+        " every grid; by default {skew weight}, or the weight in the instance file.",
     ),
 ]
 Processes = Annotated[int, _jobs(help="Number of processes that work in parallel.")]

@@ -71,8 +71,9 @@ class SketchOptions:
         typer.Option(
             "--stroke-weight",
             metavar="X",
-            help="Weight of the distance from the strokes, 0 to {most weight}, the same on every grid; by"
-            " default {stroke weight}, or the weight in the instance file.",
+            help="Weight of the distance from the strokes, 0 to {most weight} (to less on grids below 24"
+            " pixels), the same on every grid; by default {stroke weight}, or the weight in the instance"
+            " file.",
         ),
     ] = None
 

@@ -75,9 +75,9 @@ def round_to_digits(value: float) -> float:
     return float(f"{value:.12g}") + 0.0  # no -0.0
 
 
-def _check_weight(name: str, value: float) -> None:
-    if not 0 <= value <= MOST_WEIGHT:
-        raise InstanceError(f"{name} is {value}; it must be between 0 and {MOST_WEIGHT:g}")
+def _check_weight(name: str, value: float, most: float = MOST_WEIGHT, where: str = "") -> None:
+    if not 0 <= value <= most:
+        raise InstanceError(f"{name} is {value}; it must be between 0 and {most:g}{where}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -422,7 +422,7 @@ class Instance(Pictured):
         ----------
         stroke_weight, skew_weight
             The coefficients on a grid of 24 pixels on its longer side, 0 to 1e6. On another grid they are
-            stroke_weight 24 / side and skew_weight (24 / side)^2. None keeps a weight.
+            stroke_weight 24 / side and skew_weight (24 / side)^2, and at most 1e6 too. None keeps a weight.
 
         Returns
         -------
@@ -432,17 +432,18 @@ class Instance(Pictured):
         Raises
         ------
         InstanceError
-            For a weight or coefficient out of range.
+            For a weight out of the range on this grid.
 
         """
         changed: dict[str, Any] = {}
         for term, weight in (("stroke", stroke_weight), ("skew", skew_weight)):
             if weight is not None:
-                _check_weight(f"{term}_weight", weight)
-                power = _POWERS[term]
-                changed[f"{term}_coefficient"] = (
-                    weight * self.domain.reference**power / self.domain.side**power
-                )
+                power, side = _POWERS[term], self.domain.side
+                most = MOST_WEIGHT * min(side**power / self.domain.reference**power, 1.0)
+                where = f" on a grid of {side} pixels" if most < MOST_WEIGHT else ""
+                _check_weight(f"{term}_weight", weight, most, where)
+                coefficient = weight * self.domain.reference**power / side**power
+                changed[f"{term}_coefficient"] = min(coefficient, MOST_WEIGHT)
         return replace(self, **changed) if changed else self
 
     @property

@@ -264,7 +264,8 @@ def _check_form(document: dict[str, Any]) -> None:
 def describe_schema_error(error: Any) -> str:
     """Return place and fault of a schema error, and as the remedy the description in the schema."""
     place = error.json_path[2:]
-    fault = f"{shortened(error.message, 200)}; write {error.schema['description']}"
+    message = f"{error.instance} has no place there" if error.validator == "not" else error.message
+    fault = f"{shortened(message, 200)}; write {error.schema['description']}"
     return f"{place}: {fault}" if place else fault
 
 
