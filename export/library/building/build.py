@@ -16,7 +16,8 @@ from typing import Any
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.processes.deadline import Progress, silent
-from ....models.storage import make_folder, sha256_of, write_bytes
+from ....models.storage import make_folder, write_bytes
+from ....models.written_files import sha256_of
 from ..documents.checksums import is_intact, read_checksums
 from ..documents.documents import (
     Library,
@@ -230,4 +231,4 @@ class _Build:
 
     def _write(self, files: Files) -> None:
         for name, data in files.items():
-            write_bytes(self.folder / name, data)
+            write_bytes(self.folder / name, data, force=True)

@@ -60,7 +60,7 @@ def write_index(
     ]
     written = general_files(folder, spec, sidecars, skipped)
     for name, data in written.items():
-        write_bytes(folder / name, data)
+        write_bytes(folder / name, data, force=True)
     abouts = [about_file(planned.recipe.name) for planned in plans]
     present = {*written, LEDGER, *read_ledger(folder).files, *abouts}
     present |= {name for file in abouts for name in files_of_instance(load_document(folder / file))}

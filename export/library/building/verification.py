@@ -19,6 +19,7 @@ from ....models.input_limits import MAX_SOLUTION
 from ....models.packed import unpack
 from ....models.processes.deadline import Progress, silent
 from ....models.storage import read_bytes
+from ....models.written_files import LIST
 from ...formats.registry import program_version
 from ..documents.check_point import BadInputError, check
 from ..documents.checksums import SUMS, is_intact, read_checksums
@@ -76,7 +77,7 @@ def _file_names(folder: Path) -> set[str]:
     return {
         path.name
         for path in folder.iterdir()
-        if path.is_file() and not path.is_symlink() and path.suffix != ".part"
+        if path.is_file() and not path.is_symlink() and path.name != LIST and path.suffix != ".part"
     }
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Final
 
 from ....models.errors import InputError
-from ....models.storage import read_bytes, sha256_of, write_bytes
+from ....models.storage import read_bytes, write_bytes
+from ....models.written_files import sha256_of
 
 SUMS: Final = "SHA256SUMS"
 _LINE: Final = re.compile(r"([0-9a-f]{64})  ([A-Za-z0-9][A-Za-z0-9_.-]*)")
@@ -32,7 +33,7 @@ def read_checksums(folder: Path) -> dict[str, str]:
 def write_checksums(folder: Path, names: Iterable[str]) -> None:
     """Write the list of these files. Raises InputError for a missing file, OutputError."""
     lines = (f"{sha256_of(folder / name)}  {name}\n" for name in sorted(names))
-    write_bytes(folder / SUMS, "".join(lines).encode())
+    write_bytes(folder / SUMS, "".join(lines).encode(), force=True)
 
 
 def is_intact(folder: Path, name: str, sums: Mapping[str, str]) -> bool:
