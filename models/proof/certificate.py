@@ -159,11 +159,14 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
     """The proof with the checker's findings, and with the bound and the forced jumps that it confirms.
 
     After Ctrl-C, the proof has only the levels that are checked. KeyboardInterrupt is raised without any, and
-    in a block that catches Ctrl-C itself.
+    in a block that catches Ctrl-C itself. Last levels whose check takes more memory than a reader grants are
+    left out.
 
     jobs: as of `read_certificate`. Raises one of `REFUSALS` for a proof that does not hold, and WorkerError
     when a process dies.
     """
+    while not _takes_memory_of_file(proof) and len(proof.levels) > 1:
+        proof = replace(proof, levels=proof.levels[:-1], bound=0.0, forced=0, ended="labels", pieces=None)
     arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
     closed = proof.status == "optimal" or proof.forced == len(proof.levels[0].p)
     has_pieces = proof.pieces is not None or closed
@@ -191,6 +194,16 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
     checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended, pieces=pieces)
     object.__setattr__(checked, "proven", proven)
     return checked
+
+
+def _takes_memory_of_file(proof: Proof) -> bool:
+    """Whether the check of a proof takes at most the memory that its certificate may take."""
+    arrays = _head_arrays(proof) | _proof_arrays(proof)
+    for size in (lambda: 0, lambda: len(pack_arrays(arrays))):  # packing takes long
+        with suppress(check_certificate.UnreadableError):
+            check_certificate.check_memory(arrays, size())
+            return True
+    return False
 
 
 @contextmanager
