@@ -170,13 +170,14 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
     arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
     closed = proof.status == "optimal" or proof.forced == len(proof.levels[0].p)
     has_pieces = proof.pieces is not None or closed
-    with _pass_function(arrays, jobs, progress) as pass_all:
+    with _pass_function(arrays, jobs, silent) as pass_all:
 
         def pass_until_interrupted(work: Any, tasks: list[Any]) -> list[Any]:
             passes = list[Any]()
             try:
                 for level_pass in pass_all(work, tasks):
-                    passes.append(level_pass)
+                    passes.append(level_pass)  # before the report, which Ctrl-C may interrupt
+                    progress(f"checked {len(passes)} of {len(tasks)} levels")
             except KeyboardInterrupt:
                 if not passes or are_interrupts_caught():
                     raise
