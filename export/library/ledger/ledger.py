@@ -186,9 +186,9 @@ def write_ledger(ledger: Ledger) -> None:
     data = (json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n").encode()
     with catch_interrupts() as pressed:
         for name, content in ledger.unwritten.items():
-            write_bytes(ledger.folder / name, content, force=True)
+            write_bytes(ledger.folder / name, content)
         if not path.exists() or read_bytes(path) != data:
-            write_bytes(path, data, force=True)
+            write_bytes(path, data)
     if pressed():
         raise KeyboardInterrupt
 

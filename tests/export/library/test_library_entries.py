@@ -148,6 +148,18 @@ def test_an_unknown_entry_suggests_near_names(name, near):
 # The command
 
 
+def test_files_of_the_user_are_not_replaced_by_those_of_an_entry(tmp_path, capsys):
+    mine = tmp_path / "cf_cyl_n005.instance.json"
+    mine.write_text("mine")
+    command = ["library", "get", "cf_cyl_n005_exact", "-o", str(tmp_path), "--quiet"]
+    assert invoke(command) == 1
+    assert "cf_cyl_n005.instance.json: is not crossfield's, or has changed" in capsys.readouterr().err
+    assert contents(tmp_path) == {mine.name: b"mine"}
+    assert invoke([*command, "--force"]) == 0
+    assert mine.read_text() != "mine"
+    assert invoke(command) == 0
+
+
 def test_the_command_writes_the_files_of_the_selected_entries(built, tmp_path, capsys):
     names = ["cf_cyl_n005_exact", "cf_cyl_n005_milp"]
     assert invoke(["library", "get", *names, "--rung", "tiny", "-o", str(tmp_path), "--json"]) == 0
