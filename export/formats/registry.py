@@ -21,7 +21,6 @@ from ...models.formulations.families import ANY_DEGREE
 from ...models.formulations.problem import Problem, with_products_lifted
 from ...models.instance.domain import Floats
 from ...models.memory import check_memory
-from ...models.written_files import check_targets
 from ..writing.canonical import CanonicalForm
 from ..writing.sink import is_packed, pending_file
 
@@ -193,12 +192,7 @@ def header_lines(problem: Problem) -> list[str]:
 
 
 def write(
-    problem: Problem,
-    path: str | Path,
-    *,
-    dialect: str | None = None,
-    start: CrossField | None = None,
-    force: bool = False,
+    problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
 ) -> Written:
     """Write a problem to a file. Equal problems give equal bytes.
 
@@ -215,8 +209,6 @@ def write(
     start
         A field whose point becomes the starting point. Only for formats that have a place for one: nl, gms,
         qplib and bar.
-    force
-        Whether to replace files that crossfield has not written or that have changed since.
 
     Returns
     -------
@@ -230,7 +222,7 @@ def write(
     InputError
         For an unknown suffix or dialect, and for more pixels or faces than the memory holds.
     OutputError
-        If a file cannot be written, or if another one is in the way.
+        If a file cannot be written.
 
     """
     path = Path(path)
@@ -250,32 +242,27 @@ def write(
     domain = problem.instance.domain
     check_memory(domain.size, "written", domain.kind)
     held = problem_in_format(problem, entry)
-    check_targets(path.parent, file_names(path.name, entry.name), force=force)
     form = CanonicalForm(held)
     point = None if start is None else held.point(start)
     written = Written(entry.name, chosen, held)
     lines = header_lines(held)
-    contents = [entry.generate(form, lines, point, chosen), *_companions(entry.name, form, lines)]
-    files = zip(map(path.with_name, file_names(path.name, entry.name)), contents, strict=True)
+    files = [(path, entry.generate(form, lines, point, chosen)), *_companions(path, entry.name, form, lines)]
     with ExitStack() as stack:  # the files get their names together, at its end
         for file, content in files:
-            written.files[file.name] = stack.enter_context(pending_file(file, content, force=force))
+            written.files[file.name] = stack.enter_context(pending_file(file, content))
     return written
 
 
-def file_names(name: str, form: str) -> list[str]:
-    """The names of a model and of the files that come with it."""
-    stem, packed = Path(_unpacked_name(Path(name))).stem, ".gz" * is_packed(Path(name))
-    companions = {"nl": [".row", ".col"], "mod": [f".dat{packed}"]}
-    return [name, *(f"{stem}{suffix}" for suffix in companions.get(form, []))]
-
-
-def _companions(name: str, form: CanonicalForm, lines: list[str]) -> Iterator[Iterator[bytes]]:
+def _companions(
+    path: Path, name: str, form: CanonicalForm, lines: list[str]
+) -> Iterator[tuple[Path, Iterator[bytes]]]:
     """Companion files: names of an .nl, never compressed, and data of a .mod, compressed like the model."""
+    stem = Path(_unpacked_name(path)).stem
     if name == "nl":
-        yield form.nl_order.row_file()
-        yield form.nl_order.column_file()
+        yield path.with_name(f"{stem}.row"), form.nl_order.row_file()
+        yield path.with_name(f"{stem}.col"), form.nl_order.column_file()
     if name == "mod":
         from . import ampl
 
-        yield ampl.generate_data(form.problem, lines)
+        packed = path.suffix if is_packed(path) else ""
+        yield path.with_name(f"{stem}.dat{packed}"), ampl.generate_data(form.problem, lines)

@@ -192,11 +192,10 @@ class OrthogonalEnergy:
                 break
             step = np.where(residual[row] > 0, -1, 1).astype(np.int32)
             moved = self.step_residuals(residual, row, step)
-            reached = self.total(moved)
-            failed[row] = reached >= lowered(total)
+            failed[row] = self.total(moved) >= lowered(total)
             if not failed[row]:
                 z[row] += step
-                residual, total, failed[:] = moved, reached, False
+                residual, total, failed[:] = moved, self.total(moved), False
         while self.size > MOST_DENSE and not over():
             nearest = z - np.round(np.round(residual / HALF, 9)).astype(np.int32)
             moved = self.residuals(self.fit_angles(nearest), nearest)
