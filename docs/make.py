@@ -282,13 +282,14 @@ def draw_tutorials() -> None:
     from surface import field_by
 
     problem, pictures = cf.formulate(cf.sample("ellipsoid", 7), "milp-mccormick"), DOCS / "pictures"
-    cf.draw(cf.solve(problem, solver="highs").field, pictures / "ellipsoid_milp.png", kind="overview")
+    milp = cf.solve(problem, solver="highs").field
+    cf.draw(milp, pictures / "ellipsoid_milp.png", kind="overview", force=True)
     page = (DOCS / "tutorials" / "drawing.md").read_text()
     with tempfile.TemporaryDirectory() as name:
         drawing = Path(name) / "pebble.svg"
         drawing.write_text(re.findall(r"```xml\n(.*?)```", page, re.DOTALL)[0])
         field = field_by("bend", cf.read_sketch(drawing, size=48))
-        cf.draw(field, pictures / "pebble_field.png", kind="overview")
+        cf.draw(field, pictures / "pebble_field.png", kind="overview", force=True)
         cf.write_surface(cf.surface(field), name, drawing=drawing, side=1000)
         shutil.copy(Path(name) / "overlay.png", pictures / "pebble_surface.png")
 

@@ -130,7 +130,7 @@ def archive(entry: Entry) -> bytes:
             cf.draw(field, folder / "overlay.svg", underlay=entry.drawing)
         stream = io.BytesIO()
         with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as files:
-            for path in sorted(folder.iterdir()):
+            for path in sorted(folder.glob("[!.]*")):
                 files.writestr(zipfile.ZipInfo(path.name), path.read_bytes(), zipfile.ZIP_DEFLATED)
     return stream.getvalue()
 

@@ -1,89 +1,221 @@
-"""Complete files or none: written to a temporary neighbour, then renamed."""
+"""Complete files or none: written under a temporary name beside the final one, then renamed.
+
+Nothing replaces a file that crossfield has not written or that has changed since (written_files.py).
+"""
 
 from __future__ import annotations
 
-import hashlib
 import os
-import re
 import secrets
 import shutil
-import socket
 import stat
-from collections.abc import Iterator
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import count
 from pathlib import Path
 from typing import IO, Final
 
-from .errors import InputError, OutputError
+if sys.platform != "win32":
+    import fcntl
 
-PART: Final = ".part"  # suffix of the names of temporary neighbours, which begin with a dot
-_MARK: Final = re.compile(r"\..*\.([0-9a-f]{8})-(\d+)-[0-9a-f]+\.part", re.DOTALL)
+from .errors import CrossfieldError, InputError, OutputError
+from .written_files import MARK, add_to_list, check_targets, is_unchanged, sha256_of
+
 _UNFINISHED: Final[set[Path]] = set()
 _LONGEST: Final = 50  # characters of a name that a neighbour's name repeats, at most 200 of 255 bytes
 
 
 @contextmanager
-def replacing(path: str | Path) -> Iterator[IO[bytes]]:
+def replacing(
+    path: str | Path, *, force: bool = False, sha256: Callable[[], str] | None = None
+) -> Iterator[IO[bytes]]:
     """A binary stream to a temporary neighbour of `path` that replaces it on success.
 
-    On any failure, Ctrl-C included, the neighbour is removed and the old file at `path` stays.
-    Raises OutputError when the folder cannot be written or the disk is full.
+    On any failure, Ctrl-C included, the neighbour is removed and the old file at `path` stays. Raises
+    OutputError when the folder cannot be written or the disk is full. Unless forced, it also refuses a `path`
+    with a file that crossfield has not written, or that has changed since.
+
+    sha256: returns the hash of what was written, for callers that compute it themselves.
     """
     path = Path(path)
-    temporary = neighbour(path)
-    _UNFINISHED.add(temporary)
-    try:
+    check_targets(path.parent, [path.name], force=force)
+    with _temporary_neighbour(path, lambda new: new.open("xb").close()) as temporary:
         try:
-            remove_dead(path.parent)
-            stream = temporary.open("xb")
-        except OSError as error:
-            raise OutputError(
-                f"cannot be written: {_reason(error)}; choose another folder", file=path
-            ) from error
-        try:
-            with stream:
+            with temporary.open("wb") as stream:
                 yield stream
+            check_targets(path.parent, [path.name], force=force)
+            add_to_list(path.parent, {path.name: sha256() if sha256 else sha256_of(temporary)})
             temporary.replace(path)
         except OSError as error:
             raise OutputError(
                 f"cannot be written: {_reason(error)}; free some space or choose another folder", file=path
             ) from error
-    except BaseException:
-        with suppress(OSError):
-            temporary.unlink()
-        raise
-    _UNFINISHED.discard(temporary)
+
+
+@dataclass(frozen=True)
+class NewResults:
+    """Results that `replace_results` installs at its end.
+
+    Parameters
+    ----------
+    path
+        The temporary folder to write them to.
+    folder
+        Where they go.
+    kept
+        Names of earlier files that stay as they are, whatever the temporary folder holds.
+
+    """
+
+    path: Path
+    folder: Path
+    kept: set[str] = field(default_factory=set)
+
+    def set_aside(self) -> Path:
+        """Give the temporary folder a visible name, so that its files do not take their places; return it."""
+        names = (self.folder / f"new-results{number or ''}" for number in count())
+        return self.path.rename(next(path for path in names if not os.path.lexists(path)))
 
 
 @contextmanager
-def replacing_files(folder: str | Path) -> Iterator[Path]:
-    """A temporary folder, whose files replace those of `folder`, one after the other, on success.
+def replace_results(
+    folder: str | Path, planned: Iterable[str], *, reads: Iterable[str | Path] = (), force: bool = False
+) -> Iterator[NewResults]:
+    """A temporary folder whose files take their places in `folder` together on success.
 
-    On any failure, Ctrl-C included, the old files stay. Raises OutputError when the folder cannot be written.
+    At the same time, earlier files of the planned names are removed if they are neither replaced nor kept,
+    and if they are unchanged since crossfield wrote them. On any failure, Ctrl-C included, all files stay.
+
+    Parameters
+    ----------
+    folder
+        The folder of the results; created if it does not exist.
+    planned
+        Names, relative to the folder, of all files that may be written. They appear in this order.
+    reads
+        Files that the same call reads; they are never replaced, even if forced.
+    force
+        Whether to replace files that crossfield has not written or that have changed since.
+
+    Raises
+    ------
+    OutputError
+        At the beginning, for files in the way, with their names and remedies, and for a folder that cannot
+        be written. At the end, for files that came into the way meanwhile; the new ones then stay in a folder
+        that the message names.
+
     """
-    folder = make_folder(folder)
-    temporary = neighbour(folder / "files")
-    _UNFINISHED.add(temporary)
+    folder, order, reads = make_folder(folder), list(dict.fromkeys(planned)), tuple(reads)
+    check_targets(folder, order, reads=reads, force=force)
+    with _temporary_neighbour(folder / "results", Path.mkdir) as temporary:
+        new = NewResults(temporary, folder)
+        try:
+            yield new
+        except CrossfieldError as error:  # the user knows the files by their names in the folder
+            error.args = tuple(str(text).replace(str(temporary), str(folder)) for text in error.args)
+            raise
+        if not temporary.exists():
+            return
+        paths = sorted(
+            path for path in temporary.rglob("*") if path.is_file() and not MARK.fullmatch(path.name)
+        )
+        staged: dict[str, Path | None] = {path.relative_to(temporary).as_posix(): path for path in paths}
+        others = [name for name in staged if name not in order]
+        steps = {name: staged.get(name) for name in others + order if name not in new.kept}
+        steps = {name: path for name, path in steps.items() if path or is_unchanged(folder / name)}
+        try:
+            check_targets(folder, steps, reads=reads, force=force)
+            _install(steps, folder)
+        except OutputError as error:
+            raise OutputError(f"{error}; the new files are in {new.set_aside()}") from error
+
+
+def _install(steps: dict[str, Path | None], folder: Path) -> None:
+    """Move files to their names in a folder, and remove those of names without a file.
+
+    All are listed before one appears. Ctrl-C waits until all are done. Raises OutputError.
+    """
+    digests: dict[Path, dict[str, str]] = {}
+    for name, path in steps.items():
+        if path is not None:
+            target = folder / name
+            digests.setdefault(make_folder(target.parent), {})[target.name] = sha256_of(path)
+    try:
+        for place, written in digests.items():
+            add_to_list(place, written)
+        interrupt: KeyboardInterrupt | None = None
+        while steps:
+            try:
+                _move_first(steps, folder)
+            except KeyboardInterrupt as error:
+                interrupt = error
+    except OSError as error:
+        raise OutputError(
+            f"cannot be written: {_reason(error)}; choose another folder", file=folder
+        ) from error
+    if interrupt is not None:
+        raise interrupt
+
+
+def _move_first(steps: dict[str, Path | None], folder: Path) -> None:
+    """Take the first of the steps of `_install`; it may have been interrupted before."""
+    name, path = next(iter(steps.items()))
+    if path is None:
+        (folder / name).unlink(missing_ok=True)
+    elif path.exists():
+        path.replace(folder / name)
+    del steps[name]
+
+
+@contextmanager
+def _temporary_neighbour(path: Path, create: Callable[[Path], object]) -> Iterator[Path]:
+    """A new temporary file or folder beside `path`, removed at the end unless it was renamed.
+
+    A lock shows other processes that it is in use. Raises OutputError when it cannot be created.
+    """
+    temporary, lock = neighbour(path), None
     try:
         try:
-            remove_dead(folder)
-            temporary.mkdir()
+            remove_dead(path.parent)
+            while lock is None:
+                temporary = neighbour(path)
+                _UNFINISHED.add(temporary)
+                create(temporary)
+                with suppress(BlockingIOError, FileNotFoundError):  # another process took it for a dead one
+                    lock = _lock(temporary)
         except OSError as error:
             raise OutputError(
-                f"cannot be written: {_reason(error)}; choose another folder", file=folder
+                f"cannot be written: {_reason(error)}; choose another folder", file=path
             ) from error
         yield temporary
-        for path in sorted(path for path in temporary.rglob("*") if path.is_file()):
-            target = folder / path.relative_to(temporary)
-            make_folder(target.parent)
-            try:
-                path.replace(target)
-            except OSError as error:
-                reason = f"cannot be replaced: {_reason(error)}; choose another folder"
-                raise OutputError(reason, file=target) from error
     finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        _remove(temporary)
+        if lock is not None and lock >= 0:
+            os.close(lock)
+        _UNFINISHED.discard(temporary)
+
+
+def _lock(temporary: Path) -> int:
+    """Descriptor that locks a temporary file or folder until it is closed or its process ends.
+
+    -1 on systems and disks without locks. Raises BlockingIOError if it is locked, FileNotFoundError if it is
+    removed.
+    """
+    if sys.platform == "win32":
+        return -1
+    descriptor = os.open(temporary, os.O_RDONLY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        temporary.lstat()
+    except OSError as error:
+        os.close(descriptor)
+        if isinstance(error, BlockingIOError | FileNotFoundError):
+            raise
+        return -1
+    return descriptor
 
 
 def remove_unfinished() -> None:
@@ -92,69 +224,54 @@ def remove_unfinished() -> None:
     Ctrl-C can come between two lines of the blocks above, where none of their handlers sees it.
     """
     for path in tuple(_UNFINISHED):
-        shutil.rmtree(path, ignore_errors=True)
-        with suppress(OSError):
-            path.unlink()
+        _remove(path)
 
 
-def remove_file(path: Path) -> None:
-    """Remove a file, if there is one; a folder stays. Raises OutputError when that is impossible."""
-    try:
-        if not path.is_dir():
+def _remove(path: Path) -> None:
+    """Remove a temporary file or folder, if it is there."""
+    with suppress(OSError):
+        if path.is_dir():
+            shutil.rmtree(path, ignore_errors=True)
+        else:
             path.unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot be removed: {_reason(error)}; choose another folder", file=path) from error
 
 
 def neighbour(path: Path) -> Path:
-    """A name in the folder of `path` that no other writer uses, because it contains machine and process."""
-    return path.with_name(f".{path.name[:_LONGEST]}.{_machine()}-{os.getpid()}-{secrets.token_hex(4)}{PART}")
+    """A new name in the folder of `path`, used by nobody else."""
+    return path.with_name(f".{path.name[:_LONGEST]}.crossfield-{secrets.token_hex(8)}.part")
 
 
 @lru_cache(maxsize=1024)
 def remove_dead(folder: Path) -> None:
     """Remove temporary files of this user's killed processes from a folder, once per process and folder.
 
-    Keeps files of processes whose state is unknown: on Windows, and for other machines. No write needs the
+    Their locks ended with their processes, which may have run in other containers. No write needs the
     removal, because names are never used twice. Raises OSError when the folder cannot be listed.
     """
+    if sys.platform == "win32":
+        return
     for path in folder.iterdir():
-        mark = _MARK.fullmatch(path.name)
-        if mark is None or mark[1] != _machine() or _lives(int(mark[2])):
-            continue
         with suppress(OSError):
-            status = path.lstat()
-            if status.st_uid != os.geteuid():
+            if not MARK.fullmatch(path.name) or path.lstat().st_uid != os.geteuid():
                 continue
-            if stat.S_ISDIR(status.st_mode):
-                shutil.rmtree(path, ignore_errors=True)
-            else:
-                path.unlink()
+            lock = _lock(path)
+            if lock >= 0:
+                _remove(path)
+                os.close(lock)
 
 
-def _machine() -> str:
-    """Eight digits for the name of this machine."""
-    return hashlib.sha256(socket.gethostname().encode()).hexdigest()[:8]
-
-
-def _lives(process: int) -> bool:
-    """Whether a process may be running."""
-    if os.name == "nt":  # signal 0 would end it there
-        return True
-    try:
-        os.kill(process, 0)
-    except (ProcessLookupError, OverflowError):
-        return False
-    except OSError:
-        return True
-    return True
-
-
-def write_bytes(path: str | Path, data: bytes) -> Path:
-    """Write `data` and return the path. Raises OutputError."""
-    with replacing(path) as stream:
+def write_bytes(path: str | Path, data: bytes, *, force: bool = False) -> Path:
+    """Write `data` and return the path. Raises OutputError, as `replacing`."""
+    with replacing(path, force=force) as stream:
         stream.write(data)
     return Path(path)
+
+
+def require_suffix(path: Path, *allowed: str) -> None:
+    """Raise InputError for a file with none of the allowed suffixes."""
+    if path.suffix.lower() not in allowed:
+        has = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
+        raise InputError(f"has {has}, which selects no format; use {', '.join(allowed)}", file=path)
 
 
 def read_bytes(path: str | Path, most: int | None = None, remedy: str = "give a smaller file") -> bytes:
@@ -182,12 +299,6 @@ def make_folder(path: str | Path) -> Path:
     except OSError as error:
         raise OutputError(f"cannot be created: {_reason(error)}; choose another folder", file=path) from error
     return path
-
-
-def sha256_of(path: str | Path) -> str:
-    """The SHA-256 of a file as 64 hexadecimal digits."""
-    with Path(path).open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
 def _reason(error: OSError | ValueError) -> str:

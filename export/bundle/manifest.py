@@ -43,6 +43,10 @@ class Manifest:
         """The folder of the set."""
         return self.path.parent
 
+    def moved_to(self, folder: str | Path) -> Manifest:
+        """The manifest after its set has moved to another folder."""
+        return Manifest(self.document, Path(folder) / self.path.name)
+
     def instance(self) -> Instance:
         """The instance next to the manifest. Raises InputError, and InstanceError for another instance."""
         path = self.folder / self.document["instance"]["file"]
@@ -127,14 +131,14 @@ def write_manifest(
     return _write_document(manifest_document(problem, written, refused), folder, stem)
 
 
-def add_to_manifest(problem: Problem, written: Written, folder: Path) -> Manifest:
+def add_to_manifest(problem: Problem, written: Written, folder: Path, earlier_folder: Path) -> Manifest:
     """Write manifest and instance for a problem just written in one format; return the manifest.
 
-    Files of the same problem that an existing manifest lists stay listed. Raises OutputError.
+    Files of the same problem that a manifest in the earlier folder lists stay listed. Raises OutputError.
     """
     document = manifest_document(problem, [written], {})
     try:
-        earlier = read_manifest(_manifest_path(folder, file_stem(problem))).document
+        earlier = read_manifest(manifest_path(earlier_folder, file_stem(problem))).document
     except CrossfieldError:
         earlier = {"sha256": ""}
     if earlier["sha256"] == problem.sha256:
@@ -145,11 +149,12 @@ def add_to_manifest(problem: Problem, written: Written, folder: Path) -> Manifes
 
 
 def _write_document(document: dict[str, Any], folder: Path, stem: str) -> Manifest:
-    path = write_bytes(_manifest_path(folder, stem), (json.dumps(document, indent=1) + "\n").encode())
+    path = write_bytes(manifest_path(folder, stem), (json.dumps(document, indent=1) + "\n").encode())
     return Manifest(document, path)
 
 
-def _manifest_path(folder: Path, stem: str) -> Path:
+def manifest_path(folder: Path, stem: str) -> Path:
+    """The path of the manifest of a problem."""
     return folder / f"{stem}.manifest.json"
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterable
 from dataclasses import asdict
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -25,11 +26,11 @@ from ...models.formulations.windows import Windows
 from ...models.instance.domain import Ints
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress, silent
-from ...models.storage import make_folder
-from ..formats.registry import DEFAULTS, FORMATS, problem_in_format, write
+from ...models.storage import replace_results
+from ..formats.registry import DEFAULTS, FORMATS, file_names, problem_in_format, write
 from ..solvers_table import smallest_problem
-from .manifest import LARGE, Manifest, file_stem, narrow_windows, write_manifest
-from .starts import write_starts
+from .manifest import LARGE, Manifest, file_stem, instance_file, narrow_windows, write_manifest
+from .starts import STARTS, start_name, write_starts
 
 
 def write_problem(
@@ -40,6 +41,7 @@ def write_problem(
     start: CrossField | None = None,
     dialects: dict[str, str] | None = None,
     compress: bool = False,
+    force: bool = False,
 ) -> Manifest:
     """Write one problem in several formats, with its instance and manifest.
 
@@ -51,7 +53,7 @@ def write_problem(
         Folder to write to; created if it does not exist.
     formats
         Names of formats. Those that cannot carry the problem are listed in the manifest as refused.
-    start, dialects, compress
+    start, dialects, compress, force
         As for `write_all`.
 
     Returns
@@ -67,7 +69,7 @@ def write_problem(
         For an unknown format, and for a problem that no manifest records: with columns fixed one by one, or
         with products lifted beforehand.
     OutputError
-        If a file cannot be written.
+        If a file cannot be written, or if others are in the way.
 
     """
     if not is_recordable(problem):
@@ -75,9 +77,10 @@ def write_problem(
         raise InputError(f"a manifest cannot record {changed}; write it as a single file")
     formats = tuple(formats)
     _check_formats(formats, dialects or {}, [problem.formulation])
-    return _write_problem_files(
-        problem, make_folder(folder), formats, start, dialects or {}, compress=compress
-    )
+    names = names_of_set(problem.instance, problem.name, formats, compress=compress)
+    with replace_results(folder, names, force=force) as new:
+        manifest = _write_problem_files(problem, new.path, formats, start, dialects or {}, compress=compress)
+    return manifest.moved_to(folder)
 
 
 def write_all(
@@ -92,6 +95,7 @@ def write_all(
     options: dict[str, Any] | None = None,
     dialects: dict[str, str] | None = None,
     compress: bool = False,
+    force: bool = False,
     progress: Progress = silent,
 ) -> list[Manifest]:
     """Write formulations of an instance in every format that carries them.
@@ -118,6 +122,8 @@ def write_all(
         By format: `text` or `binary` for nl.
     compress
         Whether to write model files as .gz.
+    force
+        Whether to replace files that crossfield has not written or that have changed since.
     progress
         Receives the name of each formulation.
 
@@ -137,7 +143,7 @@ def write_all(
     InstanceError
         For a start on another instance.
     OutputError
-        If a file cannot be written.
+        If a file cannot be written, or if others are in the way.
 
     """
     options = options or {}
@@ -155,22 +161,32 @@ def write_all(
         dialects or {},
         [declare(declaration.name, instance, **chosen(declaration)) for declaration in declarations],
     )
-    folder, manifests = make_folder(folder), []
-    for declaration in declarations:
-        progress(declaration.name)
-        jumps = jumps_as_data(instance, declaration.name, jumps_of or start)
-        problem = narrow_windows(
-            formulate(instance, declaration.name, p=jumps, **chosen(declaration)), windows
-        )
-        manifests.append(
-            _write_problem_files(problem, folder, formats, start, dialects or {}, compress=compress)
-        )
-        del problem
-        if (
-            instance.domain.size > LARGE
-        ):  # a problem is in a cycle with its families, and the collector counts
-            gc.collect()  # objects, not their bytes
-    return manifests
+    sets = (
+        names_of_set(instance, declaration.name, formats, compress=compress) for declaration in declarations
+    )
+    manifests = []
+    with replace_results(folder, chain.from_iterable(sets), force=force) as new:
+        for declaration in declarations:
+            progress(declaration.name)
+            jumps = jumps_as_data(instance, declaration.name, jumps_of or start)
+            problem = narrow_windows(
+                formulate(instance, declaration.name, p=jumps, **chosen(declaration)), windows
+            )
+            manifests.append(
+                _write_problem_files(problem, new.path, formats, start, dialects or {}, compress=compress)
+            )
+            del problem
+            if instance.domain.size > LARGE:
+                gc.collect()  # a problem is in a cycle, and the collector counts objects, not their bytes
+    return [manifest.moved_to(folder) for manifest in manifests]
+
+
+def names_of_set(instance: Instance, name: str, formats: Iterable[str], *, compress: bool) -> list[str]:
+    """Names of the files that a formulation of an instance can have in some formats, the manifest last."""
+    stem, packed = f"{instance.name}.{name}", ".gz" * compress
+    models = [file_names(f"{stem}{FORMATS[form].suffix}{packed}", form) for form in formats]
+    starts = [start_name(stem, solver) for solver in STARTS]
+    return [*chain.from_iterable(models), *starts, instance_file(instance), f"{stem}.manifest.json"]
 
 
 def _check_formats(

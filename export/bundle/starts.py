@@ -136,6 +136,11 @@ STARTS: Final = {name: solver.start for name, solver in SOLVERS.items() if solve
 """The files of starting points, by solver."""
 
 
+def start_name(stem: str, solver: str) -> str:
+    """The name of the file with the starting point of a problem for a solver."""
+    return f"{stem}.{solver}.start{STARTS[solver].suffix}"
+
+
 def complete_start(problem: Problem, field: CrossField) -> Start:
     """The complete point of a field in the columns of the LP and MPS files.
 
@@ -166,7 +171,7 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
 
 
 def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: str) -> dict[str, Path]:
-    """Write the starts to the folder, as `stem.gurobi.mst` and so on, for each solver that takes the problem.
+    """Write the starts to the folder, as `stem.gurobi.start.mst`, for each solver that takes the problem.
 
     Returns the files by solver, none for a problem without integers, where they have no use. Raises as
     `write_start`.
@@ -175,7 +180,7 @@ def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: 
         return {}
     start = complete_start(problem, field)
     solvers = [name for name in STARTS if not _reason_of_refusal(problem, start, name)]
-    paths = {name: Path(folder) / f"{stem}.{name}{STARTS[name].suffix}" for name in solvers}
+    paths = {name: Path(folder) / start_name(stem, name) for name in solvers}
     for name, path in paths.items():
         save_file(path, LAYOUTS[STARTS[name].layout](start))
     return paths

@@ -18,18 +18,19 @@ from typing import Annotated, Final, NoReturn
 import typer
 
 from ...models.errors import CrossfieldError, InputError, shortened
-from ...models.storage import remove_unfinished
+from ...models.storage import remove_unfinished, replace_results, require_suffix
+from ...models.written_files import check_targets
 from . import options
 from .help_texts import Group
 from .inputs import (
     SAVED,
     check_names,
+    check_output,
     find_drawing,
     full_formulation_names,
     read_described_problem,
     read_field_or_instance,
     read_start,
-    require_suffix,
 )
 from .library_command import library
 from .mesh_options import MeshOptions
@@ -95,6 +96,7 @@ def run_command(
     sketch: SketchOptions,
     time_limit: options.SecondsPerMethod = 60.0,
     threads: options.Threads = 0,
+    force: options.Force = False,
     printing: options.PrintOptions,
 ) -> None:
     """Do all steps for one sketch or mesh: write the solver files, try the methods, keep a field and draw it.
@@ -112,10 +114,20 @@ def run_command(
     if not (printing.quiet or printing.as_json):
         print_line(plan_sentence(limits, instance))
     with show_progress(quiet=printing.quiet) as show:
-        report = run(instance, output, limits=limits, drawing=find_drawing(source), progress=show)
-    printing.show(report.document(), lambda: show_report(report, output))
+        report = run(
+            instance,
+            output,
+            limits=limits,
+            drawing=find_drawing(source),
+            mask=sketch.mask,
+            force=force,
+            progress=show,
+        )
+    printing.show(report.document(), lambda: show_report(report, report.folder))
     if report.interrupted:
         print_notice(f"interrupted: {report.interrupted}; report.json lists the results so far")
+    if report.folder != output:
+        print_notice(f"the earlier run stays in {output}; the new results are in {report.folder}")
 
 
 @command("instance")
@@ -128,6 +140,7 @@ def instance_command(
     crosses: options.Crosses = None,
     gauge: options.Gauge = None,
     skew_weight: options.SkewWeight = None,
+    force: options.Force = False,
 ) -> None:
     """Write a sketch, a sample or a mesh as an instance (.json, .npz): strokes on pixels or faces.
 
@@ -139,14 +152,15 @@ def instance_command(
     from ...models.instance.file import write_instance
     from ..pictures.mask import write_mask
 
-    require_suffix(output, (".json", ".npz", ".png"))
+    require_suffix(output, ".json", ".npz", ".png")
+    check_output(output, source, sketch.mask, mesh.directions, force=force)
     with show_progress() as show:
         show("reading the sketch")
         instance = sketch.read(source, "instance", mesh=mesh).with_weights(skew_weight=skew_weight)
         instance = instance if gauge is None else instance.with_gauge(gauge)
         if crosses is not None:
             instance = replace(instance, orthogonal=crosses == "orthogonal")
-        (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output)
+        (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output, force=force)
     print_line(f"{output}: {instance.summary}")
 
 
@@ -167,6 +181,7 @@ def export_command(
     tightened: options.Tightened = None,
     nl_form: options.NlForm = None,
     compress: options.Gzip = False,
+    force: options.Force = False,
     printing: options.PrintOptions,
 ) -> None:
     """Write an instance as files for solvers, in every formulation and format.
@@ -207,6 +222,7 @@ def export_command(
             },
             dialects={"nl": nl_form} if nl_form else {},
             compress=compress,
+            force=force,
             progress=show,
         )
     documents = [manifest.document for manifest in manifests]
@@ -227,6 +243,7 @@ def read_command(
     pick: options.Pick = None,
     gap: options.AnswerGap = None,
     bound: options.AnswerBound = None,
+    force: options.Force = False,
     printing: options.PrintOptions,
 ) -> None:
     """Read a solver's solution file back as a cross field, and check it.
@@ -235,10 +252,13 @@ def read_command(
     contains no valid answer, no field is written and the exit code is 1.
     """
     from ...models.errors import SolutionError
-    from ...models.field.file import write_field
+    from ...models.field.file import field_names, write_field
+    from ..bundle.earlier import keep_better_field, objective_function
     from ..solutions.solution import read_solution
 
-    require_suffix(output, SAVED)
+    require_suffix(output, *SAVED)
+    names, reads = field_names(output.name), [solution, manifest]
+    check_targets(output.parent, names, reads=reads, force=force)
     with show_progress(quiet=printing.quiet) as show:
         show("reading the solution")
         problem, held = read_described_problem(manifest)
@@ -258,7 +278,17 @@ def read_command(
                 file=solution,
             )
         if not answer.doubt:
-            write_field(answer.field, output)
+            with replace_results(output.parent, names, reads=reads, force=force) as new:
+                write_field(answer.field, new.path / output.name)
+                if not force:
+                    keep_better_field(
+                        new,
+                        output.name,
+                        answer.field,
+                        print_notice,
+                        on=problem.instance,
+                        value=objective_function(problem),
+                    )
     print_solution(answer, output, printing)
     if answer.doubt:
         remedy = answer.remedy and f"; {answer.remedy}"
@@ -273,6 +303,7 @@ def draw_command(
     on: options.On = None,
     kind: options.Kind = None,
     underlay: options.Underlay = None,
+    force: options.Force = False,
 ) -> None:
     """Draw a field or an instance as PNG, SVG or PDF.
 
@@ -280,12 +311,13 @@ def draw_command(
     """
     from ..pictures.draw import SUFFIXES, draw
 
-    require_suffix(output, tuple(SUFFIXES))
+    require_suffix(output, *SUFFIXES)
+    check_output(output, source, on, underlay, force=force)
     with show_progress() as show:
         show("reading")
         subject = read_field_or_instance(source, on, "draw")
         show("drawing")
-        draw(subject, output, kind=kind, underlay=underlay)
+        draw(subject, output, kind=kind, underlay=underlay, force=force)
     print_line(str(output))
 
 

@@ -73,7 +73,7 @@ PANELS: Final = {
     "Picture and surface": "kind side light flip hint port no-browser",
     "Limits and processes": "time-limit gap bound threads jobs tolerance up-to scheduler",
     FACTS: "",
-    "Output": "output quiet json help",
+    "Output": "output force quiet json help",
 }
 """Panels of the help in their order, and their options."""
 EXAMPLES: Final = {

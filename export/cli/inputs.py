@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import CrossfieldError, InputError, InstanceError
+from ...models.storage import require_suffix
+from ...models.written_files import check_targets
 from .mesh_options import check_domain
 
 if TYPE_CHECKING:
@@ -63,7 +65,7 @@ def _read_content(path: Path, on: Path | None) -> CrossField | Instance:
 
     if not path.is_file():
         raise InputError("there is no such file; give a field or an instance (.npz, .json)", file=path)
-    require_suffix(path, SAVED)
+    require_suffix(path, *SAVED)
     if on is not None:
         return read_field(path, on=read_instance(on))
     if path.suffix.lower() == ".rawfield":
@@ -80,11 +82,9 @@ def _read_content(path: Path, on: Path | None) -> CrossField | Instance:
             ) from as_field
 
 
-def require_suffix(path: Path, allowed: tuple[str, ...]) -> None:
-    """Raise InputError for a file with none of the allowed suffixes."""
-    if path.suffix.lower() not in allowed:
-        has = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
-        raise InputError(f"has {has}, which selects no format; use {', '.join(allowed)}", file=path)
+def check_output(path: Path, *reads: str | Path | None, force: bool) -> None:
+    """Raise OutputError if a command may not write to a path. reads: files that it reads."""
+    check_targets(path.parent, [path.name], reads=filter(None, reads), force=force)
 
 
 def find_drawing(source: str) -> str | None:

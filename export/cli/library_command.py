@@ -10,7 +10,7 @@ import typer
 
 from .help_texts import FACTS, Group
 from .option_groups import command as command_of
-from .options import Folder, PrintOptions, Processes, Seconds
+from .options import Folder, Force, PrintOptions, Processes, Seconds
 from .output import print_line, print_notice, show_progress
 
 _SUMMARY: Final = "Build, check and solve a library: instances in every formulation, with best known points."
@@ -42,6 +42,7 @@ def build_command(
         str | None,
         typer.Option("--scheduler", metavar="ADDRESS", help="Build on the workers of a dask scheduler."),
     ] = None,
+    force: Force = False,
     search: Annotated[
         bool,
         typer.Option("--search", help="Search for points and proofs even where the specification has them."),
@@ -81,7 +82,7 @@ def build_command(
         wanted = replace(wanted, points=None) if search else wanted
         if points is not None:
             existing_folder(points)
-        built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
+        built = build(wanted, output, jobs=jobs, scheduler=scheduler, force=force, progress=show)
         if points is not None:
             checked, refused = add_points(built, points, show)
             if any(checked.values()):
@@ -126,6 +127,7 @@ def get_command(
         str | None, typer.Option("--rung", metavar="RUNG", help="Only entries of this rung: {rungs}.")
     ] = None,
     output: Folder,
+    force: Force = False,
     printing: PrintOptions,
 ) -> None:
     """Write model files of the library that ships, without a build: the same bytes as a build.
@@ -143,7 +145,7 @@ def get_command(
     if not chosen:
         raise InputError("no entry of the library that ships is selected; relax --rung")
     with show_progress(quiet=printing.quiet) as show:
-        written = write_entries(output, chosen, progress=show)
+        written = write_entries(output, chosen, force=force, progress=show)
     number = sum(map(len, written.values()))
     printing.show(written, lambda: print_line(f"{output}: {number} files of {len(written)} entries"))
 

@@ -61,6 +61,15 @@ ProofFolder = Annotated[Path | None, _folder(help="Folder for field, certificate
 Output = Annotated[
     Path, typer.Option("-o", "--output", metavar="FILE", help="File to write; its suffix selects the format.")
 ]
+Force = Annotated[
+    bool,
+    typer.Option(
+        "--force",
+        help="Replace also files that crossfield has not written or that have changed since, and better"
+        " results than the new ones. Without it, the command stops before any work if such files are in the"
+        " way, and better results stay. Files that the command reads are never replaced.",
+    ),
+]
 Manifest = Annotated[
     Path,
     typer.Option(

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
 
 import typer
 
 from ...models.errors import CrossfieldError
+from ...models.written_files import is_unchanged
 from . import options
-from .inputs import read_start
+from .inputs import find_drawing, read_start
 from .output import print_line, print_notice, show_facts, show_progress
 from .sketch_options import Size, SketchOptions
 
 if TYPE_CHECKING:
     from ...models.field.field import Norm as NormOfField
+    from ...models.instance.instance import Instance
     from ...models.proof.certificate import Certificate
     from ...models.proof.orthogonal_certificate import LevelFacts, OrthogonalProof
     from ...models.proof.record import LevelRecord, Proof
+    from ...models.storage import NewResults
 
 NORMS: Final[dict[str, NormOfField]] = {"1": 1, "2": 2, "mixed": "mixed"}
 """Norms by their names on the command line."""
@@ -37,6 +40,7 @@ def prove_command(
     time_limit: options.SecondsOfProof = 60.0,
     gap: options.ProofGap = 0.0,
     check: options.Check = None,
+    force: options.Force = False,
     printing: options.PrintOptions,
 ) -> None:
     """Compute a field and prove how far its energy can be from the minimum.
@@ -54,18 +58,24 @@ def prove_command(
         raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
     from ...models.processes.limits import Limits
     from ...models.proof.prove import prove
+    from ...models.storage import replace_results
 
     with show_progress(quiet=printing.quiet) as show:
         show("reading the sketch")
         instance = SketchOptions(size).read(source, "prove", quiet=printing.quiet)
-        proof = prove(
-            instance,
-            norm=NORMS[norm],
-            start=read_start(start, instance),
-            limits=Limits(time_limit, gap),
-            progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
-        )
-        document, failure = _write_proof(proof, output)
+        names = ProofNames.of(instance)
+        reads = [path for path in (find_drawing(source), start) if path is not None]
+        with replace_results(output, names, reads=reads, force=force) as new:
+            proof = prove(
+                instance,
+                norm=NORMS[norm],
+                start=read_start(start, instance),
+                limits=Limits(time_limit, gap),
+                progress=lambda line: show(f"{line}; Ctrl-C keeps them"),
+            )
+            document, failure = _write_proof(proof, new.path, names)
+            if not force:
+                _keep_better(new, proof, names, document)
     printing.show(document, lambda: _show_proof(proof, document, output))
     if instance.gauge == "box":
         print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")
@@ -81,20 +91,31 @@ def prove_command(
         raise failure
 
 
+class ProofNames(NamedTuple):
+    """The names of the files of a proof."""
+
+    field: str
+    certificate: str
+    report: str
+
+    @classmethod
+    def of(cls, instance: Instance) -> Self:
+        """Return the names for an instance."""
+        stem = f"{instance.name}.proof"
+        return cls(f"{stem}.field.npz", f"{stem}.certificate.npz", f"{stem}.json")
+
+
 def _write_proof(
-    proof: Proof | OrthogonalProof, folder: Path
+    proof: Proof | OrthogonalProof, folder: Path, names: ProofNames
 ) -> tuple[dict[str, Any], CrossfieldError | None]:
     """Write field, certificate and report of a proof; return the report, and why there is no certificate."""
     from ...models.field.file import write_field
-    from ...models.storage import make_folder, remove_file, write_bytes
     from ..solving.proven import certify
 
-    stem = f"{proof.field.instance.name}.proof"
-    path = make_folder(folder) / f"{stem}.certificate.npz"
-    write_field(proof.field, folder / f"{stem}.field.npz")
+    write_field(proof.field, folder / names.field)
     certificate, failure = None, None
     try:
-        certificate = certify(proof, path)
+        certificate = certify(proof, folder / names.certificate)
     except CrossfieldError as error:
         failure = error
     proven, bounds = _proven_facts(proof, certificate)
@@ -108,10 +129,46 @@ def _write_proof(
             for level, bound in zip(levels, bounds, strict=False)  # fewer are checked after Ctrl-C
         ],
     }
-    write_bytes(folder / f"{stem}.json", (json.dumps(document, indent=1) + "\n").encode())
-    if failure is not None:
-        remove_file(path)  # it is of an earlier proof
+    _write_report(document, folder / names.report)
     return document, failure
+
+
+def _write_report(document: dict[str, Any], path: Path) -> None:
+    path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+
+
+def _keep_better(
+    new: NewResults, proof: Proof | OrthogonalProof, names: ProofNames, document: dict[str, Any]
+) -> None:
+    """Keep an earlier field of less energy and an earlier certificate of a higher bound.
+
+    The report then has the energy of the one, and levels and bound of the other.
+    """
+    from ...models.proof.check_certificate import gap_of, status_of
+    from ..bundle.earlier import keep_better_bound, keep_better_field
+
+    instance, norm = proof.field.instance, proof.norm
+    bound = None if document["status"] == UNPROVEN else document["bound"]
+    higher = keep_better_bound(new, names.certificate, bound, print_notice, on=instance, norm=norm)
+    lower = keep_better_field(
+        new,
+        names.field,
+        proof.field,
+        print_notice,
+        on=instance,
+        value=lambda field: field.energy(norm).total,
+    )
+    if higher is not None:
+        if is_unchanged(new.folder / names.report):
+            document.update(json.loads((new.folder / names.report).read_text("utf-8")))
+        document |= {"bound": higher, "status": "gap"}
+    if higher is not None or lower is not None:
+        energy = (lower or proof.field).energy(norm).total
+        document["energy"] = energy
+        if document["status"] != UNPROVEN:
+            document["status"] = status_of(energy, document["bound"])
+            document["gap"] = gap_of(energy, document["bound"])
+        _write_report(document, new.path / names.report)
 
 
 def _proven_facts(

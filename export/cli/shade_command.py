@@ -33,6 +33,7 @@ def shade_command(
     side: options.PictureSide = None,
     on: options.On = None,
     underlay: options.Underlay = None,
+    force: options.Force = False,
     sketch: SketchOptions,
     printing: options.PrintOptions,
 ) -> None:
@@ -47,11 +48,13 @@ def shade_command(
     strokes.
     """
     from ...models.field.file import write_field
+    from ...models.storage import replace_results
     from ...models.surface.lift import surface
     from ..pictures.underlay import read_underlay
-    from ..surfaces.files import choose_view, surface_document, write_surface
+    from ..surfaces.files import FILES, choose_view, surface_document, write_surface
 
     hints, lamp = parse_hints(hint), parse_light(light)
+    reads = [path for path in (source, on, underlay, sketch.mask) if path is not None]
     with show_progress(quiet=printing.quiet) as show:
         show("reading")
         saved = _read_saved_field(source, on)
@@ -60,19 +63,19 @@ def shade_command(
                 "is a field, which has its own grid and strokes; omit the options that read a sketch",
                 file=source,
             )
-        if saved is None:
-            field = _compute_field(sketch.read(source, "shade", quiet=printing.quiet), show)
-            underlay = underlay or find_drawing(source)
-        else:
-            field = saved
-        drawing = None if underlay is None else read_underlay(underlay, on=field.instance)
-        view = choose_view(field.instance, drawing, side)
-        solid = surface(field, hints, flip=flip, progress=show)
-        about = _describe_choices("bend" if saved is None else None, hints, lamp, flip=flip)
-        show("drawing and writing")
-        write_surface(solid, output, drawing=drawing, light=lamp, side=side, about=about)
-        if saved is None:
-            write_field(field, output / FIELD)
+        instance = sketch.read(source, "shade", quiet=printing.quiet) if saved is None else saved.instance
+        names = [FIELD, *FILES] if saved is None else FILES
+        with replace_results(output, names, reads=reads, force=force) as new:
+            field = saved or _compute_field(instance, show)
+            if saved is None:
+                underlay = underlay or find_drawing(source)
+                write_field(field, new.path / FIELD)
+            drawing = None if underlay is None else read_underlay(underlay, on=field.instance)
+            view = choose_view(field.instance, drawing, side)
+            solid = surface(field, hints, flip=flip, progress=show)
+            about = _describe_choices("bend" if saved is None else None, hints, lamp, flip=flip)
+            show("drawing and writing")
+            write_surface(solid, new.path, drawing=drawing, light=lamp, side=side, about=about)
     document = surface_document(solid, view, about)
     printing.show(document, lambda: show_surface(solid, document, output))
 

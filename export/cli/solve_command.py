@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import typer
 
 from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
 from . import options
-from .inputs import check_names, full_formulation_names, read_start
+from .inputs import check_names, find_drawing, full_formulation_names, read_start
 from .output import print_notice, show_progress
 from .sketch_options import Size, SketchOptions
 
@@ -31,6 +32,7 @@ def solve_command(
     start: options.Start = None,
     time_limit: options.SecondsInAll = 60.0,
     threads: options.Threads = 0,
+    force: options.Force = False,
     printing: options.PrintOptions,
 ) -> None:
     """Compute a field by a method (-m), or solve one formulation with a solver (-f).
@@ -54,11 +56,12 @@ def solve_command(
             progress=show,
             limits=Limits(time_limit, threads=threads).until(deadline),
         )
+        placing = _Placing([path for path in (find_drawing(source), start) if path is not None], force)
         if method is not None:
             _check_method(method, solver, relax=relax)
-            candidate, target = _solve_by_method(method, request)
+            candidate, target = _solve_by_method(method, request, placing)
         else:
-            solution, target = _solve_by_solver(str(formulation), solver, request, relax=relax)
+            solution, target = _solve_by_solver(str(formulation), solver, request, placing, relax=relax)
     if method is not None:
         _print_candidate(candidate, target, printing)
         return
@@ -89,42 +92,69 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
         raise typer.BadParameter(f"--solver {solver}: the method {name} has its own solvers")
 
 
-def _solve_by_method(name: str, request: Request) -> tuple[Candidate, Path]:
+class _Placing(NamedTuple):
+    """What decides on files in the way: those that are read, and whether the others are replaced."""
+
+    reads: list[str | Path]
+    force: bool
+
+
+def _solve_by_method(name: str, request: Request, placing: _Placing) -> tuple[Candidate, Path]:
     """Final field of a method, and its file."""
     from ...models.field.file import write_field
-    from ...models.storage import make_folder
+    from ...models.storage import replace_results
+    from ..bundle.earlier import keep_better_field
     from ..solving.methods import find_method
 
-    method = find_method(name, request.instance)
-    target = make_folder(request.folder) / f"{request.instance.name}.{name}.field.npz"
-    *_, candidate = method.find(request)
-    write_field(candidate.field, target)
-    return candidate, target
+    instance, folder = request.instance, request.folder
+    method = find_method(name, instance)
+    field = f"{instance.name}.{name}.field.npz"
+    names = [*method.file_names(instance), field]
+    with replace_results(folder, names, reads=placing.reads, force=placing.force) as new:
+        *_, candidate = method.find(replace(request, folder=new.path))
+        write_field(candidate.field, new.path / field)
+        if not placing.force:
+            keep_better_field(new, field, candidate.field, print_notice, on=instance)
+        if field in new.kept:
+            new.kept.update(names)
+    return candidate, folder / field
 
 
 def _solve_by_solver(
-    name: str, solver: str | None, request: Request, *, relax: bool
+    name: str, solver: str | None, request: Request, placing: _Placing, *, relax: bool
 ) -> tuple[Solution, Path]:
     """Solution of one formulation, and the path of its field, which exists if the solution has a point."""
-    from ...models.field.file import write_field
     from ...models.formulations.problem import formulate
+    from ...models.written_files import check_targets
     from ..bundle.problem_files import jumps_as_data
-    from ..solving.local import solve
+    from ..solvers_table import BUNDLED, SOLVERS
+    from ..solving.local import Solvers, choose_solver, names_of_solve
 
     (name,) = full_formulation_names([name])
-    instance, deadline = request.instance, Deadline.after(request.limits.time_limit)
+    instance, folder, deadline = request.instance, request.folder, Deadline.after(request.limits.time_limit)
+    field = f"{instance.name}.{name}.field.npz"
+    for possible in [solver] if solver in SOLVERS else BUNDLED:
+        names = names_of_solve(instance, name, possible, SOLVERS[possible].formats)
+        check_targets(folder, [*names, field], reads=placing.reads, force=placing.force)
     request.progress("greedy start")
     start = request.starting_field(deadline)
     problem = formulate(instance, name, p=jumps_as_data(instance, name, start), relax=relax)
     limits = request.limits.until(deadline)
     request.progress(f"solving {name}, at most {limits.time_limit:.3g} s; Ctrl-C keeps the best point so far")
-    solution = solve(problem, solver, folder=request.folder, limits=limits, start=start)
-    target = request.folder / f"{instance.name}.{name}.field.npz"
-    if solution.point is None or solution.doubt:
-        target.unlink(missing_ok=True)  # a field of an earlier call is not the result of this one
-    else:
-        write_field(solution.field, target)
-    return solution, target
+    chosen = choose_solver(problem, solver)
+    with Solvers() as solvers:
+        solution = solvers.solve(
+            problem,
+            chosen.name,
+            folder=folder,
+            limits=limits,
+            start=start,
+            force=placing.force,
+            reads=placing.reads,
+            field_name=field,
+            notice=print_notice,
+        )
+    return solution, folder / field
 
 
 def _print_candidate(candidate: Candidate, field: Path, printing: options.PrintOptions) -> None:

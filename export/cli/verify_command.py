@@ -19,6 +19,7 @@ def verify_command(
     *,
     solve: options.SolveSeconds = None,
     program: options.ProgramNames = None,
+    force: options.Force = False,
     printing: options.PrintOptions,
 ) -> None:
     """Read every exported file with every installed solver, and compare the result with the problem.
@@ -31,7 +32,7 @@ def verify_command(
 
     programs = check_names(program, PROGRAMS, "program")
     with show_progress(quiet=printing.quiet) as show:
-        verification = verify(folder, seconds=solve, programs=programs, progress=show)
+        verification = verify(folder, seconds=solve, programs=programs, force=force, progress=show)
     printing.show(verification.document(), lambda: _show_verification(verification))
     for check in verification.failed_checks:
         print_notice(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")

@@ -21,6 +21,7 @@ from ...models.formulations.families import ANY_DEGREE
 from ...models.formulations.problem import Problem, with_products_lifted
 from ...models.instance.domain import Floats
 from ...models.memory import check_memory
+from ...models.written_files import check_targets
 from ..writing.canonical import CanonicalForm
 from ..writing.sink import is_packed, pending_file
 
@@ -192,7 +193,12 @@ def header_lines(problem: Problem) -> list[str]:
 
 
 def write(
-    problem: Problem, path: str | Path, *, dialect: str | None = None, start: CrossField | None = None
+    problem: Problem,
+    path: str | Path,
+    *,
+    dialect: str | None = None,
+    start: CrossField | None = None,
+    force: bool = False,
 ) -> Written:
     """Write a problem to a file. Equal problems give equal bytes.
 
@@ -209,6 +215,8 @@ def write(
     start
         A field whose point becomes the starting point. Only for formats that have a place for one: nl, gms,
         qplib and bar.
+    force
+        Whether to replace files that crossfield has not written or that have changed since.
 
     Returns
     -------
@@ -222,7 +230,7 @@ def write(
     InputError
         For an unknown suffix or dialect, and for more pixels or faces than the memory holds.
     OutputError
-        If a file cannot be written.
+        If a file cannot be written, or if another one is in the way.
 
     """
     path = Path(path)
@@ -242,27 +250,32 @@ def write(
     domain = problem.instance.domain
     check_memory(domain.size, "written", domain.kind)
     held = problem_in_format(problem, entry)
+    check_targets(path.parent, file_names(path.name, entry.name), force=force)
     form = CanonicalForm(held)
     point = None if start is None else held.point(start)
     written = Written(entry.name, chosen, held)
     lines = header_lines(held)
-    files = [(path, entry.generate(form, lines, point, chosen)), *_companions(path, entry.name, form, lines)]
+    contents = [entry.generate(form, lines, point, chosen), *_companions(entry.name, form, lines)]
+    files = zip(map(path.with_name, file_names(path.name, entry.name)), contents, strict=True)
     with ExitStack() as stack:  # the files get their names together, at its end
         for file, content in files:
-            written.files[file.name] = stack.enter_context(pending_file(file, content))
+            written.files[file.name] = stack.enter_context(pending_file(file, content, force=force))
     return written
 
 
-def _companions(
-    path: Path, name: str, form: CanonicalForm, lines: list[str]
-) -> Iterator[tuple[Path, Iterator[bytes]]]:
+def file_names(name: str, form: str) -> list[str]:
+    """The names of a model and of the files that come with it."""
+    stem, packed = Path(_unpacked_name(Path(name))).stem, ".gz" * is_packed(Path(name))
+    companions = {"nl": [".row", ".col"], "mod": [f".dat{packed}"]}
+    return [name, *(f"{stem}{suffix}" for suffix in companions.get(form, []))]
+
+
+def _companions(name: str, form: CanonicalForm, lines: list[str]) -> Iterator[Iterator[bytes]]:
     """Companion files: names of an .nl, never compressed, and data of a .mod, compressed like the model."""
-    stem = Path(_unpacked_name(path)).stem
     if name == "nl":
-        yield path.with_name(f"{stem}.row"), form.nl_order.row_file()
-        yield path.with_name(f"{stem}.col"), form.nl_order.column_file()
+        yield form.nl_order.row_file()
+        yield form.nl_order.column_file()
     if name == "mod":
         from . import ampl
 
-        packed = path.suffix if is_packed(path) else ""
-        yield path.with_name(f"{stem}.dat{packed}"), ampl.generate_data(form.problem, lines)
+        yield ampl.generate_data(form.problem, lines)

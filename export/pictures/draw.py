@@ -21,6 +21,7 @@ from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
 from ...models.storage import write_bytes
 from ...models.surface.surface import Surface
+from ...models.written_files import check_targets
 from . import panels
 from .canvas import draw_sheet, set_coordinates
 from .layers import field_sheet
@@ -115,6 +116,7 @@ def draw(
     *,
     kind: str | None = None,
     underlay: str | Path | Underlay | None = None,
+    force: bool = False,
 ) -> Path:
     """Draw an instance, a field or a surface into a file.
 
@@ -130,6 +132,9 @@ def draw(
     underlay
         The drawing (SVG, bitmap, .scap) or sample from which the instance was read. Its strokes become the
         bottom of `layers`; nothing else of the file is copied.
+    force
+        Whether to replace a file that crossfield has not written or that has changed since. The underlay is
+        never replaced.
 
     Returns
     -------
@@ -142,7 +147,7 @@ def draw(
         For an unknown kind or suffix, a kind that needs a field, and a drawing that cannot be read or has
         another position.
     OutputError
-        When the file cannot be written.
+        When the file cannot be written, or if another one is in the way.
 
     """
     path = Path(path)
@@ -151,6 +156,8 @@ def draw(
         raise InputError(
             f"a picture cannot be written as {path.suffix!r}; use one of {', '.join(SUFFIXES)}", file=path
         )
+    reads = [underlay] if isinstance(underlay, str | Path) else []
+    check_targets(path.parent, [path.name], reads=reads, force=force)
     if isinstance(subject, Surface):
         if kind is not None or underlay is not None:
             raise InputError("a surface has one picture, on no drawing; leave kind and underlay out")
@@ -161,12 +168,12 @@ def draw(
         if underlay is not None and isinstance(_instance_of(subject).domain, Mesh):
             raise DomainError("a mesh lies on no drawing; leave the underlay out")
         if kind == LAYERS and isinstance(subject, CrossField):
-            draw_layers(subject, [path], underlay)
+            draw_layers(subject, [path], underlay, force=force)
             return path
         if underlay is not None:
             raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}")
     with fixed_settings({"font.size": chosen.words}):
-        return write_bytes(path, _save_figure(_draw_panels(subject, chosen), suffix))
+        return write_bytes(path, _save_figure(_draw_panels(subject, chosen), suffix), force=force)
 
 
 def preview(subject: CrossField | Instance | Surface) -> bytes:
@@ -197,7 +204,13 @@ def _default_kind(subject: CrossField | Instance, suffix: str, *, underlaid: boo
     return LAYERS if suffix == ".svg" or underlaid else "field"
 
 
-def draw_layers(field: CrossField, paths: Iterable[Path], underlay: str | Path | Underlay | None) -> None:
+def draw_layers(
+    field: CrossField,
+    paths: Iterable[Path],
+    underlay: str | Path | Underlay | None,
+    *,
+    force: bool = False,
+) -> None:
     """Draw a field in the coordinates of its drawing into files, whose layers are computed once."""
     if isinstance(underlay, str | Path):
         underlay = read_underlay(underlay, on=field.instance)
@@ -205,10 +218,10 @@ def draw_layers(field: CrossField, paths: Iterable[Path], underlay: str | Path |
     for path in paths:
         suffix = path.suffix.lower()
         if suffix == ".svg":
-            write_bytes(path, sheet_svg(layers))
+            write_bytes(path, sheet_svg(layers), force=force)
         else:
             with fixed_settings():
-                write_bytes(path, _save_figure(draw_sheet(layers), suffix))
+                write_bytes(path, _save_figure(draw_sheet(layers), suffix), force=force)
 
 
 @contextmanager

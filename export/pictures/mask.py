@@ -10,12 +10,12 @@ from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS, MAX_SIDE
 from ...models.instance.domain import Bools, Floats
 from ...models.instance.instance import Instance
-from ...models.storage import replacing
+from ...models.storage import replacing, require_suffix
 
 Page = tuple[float, float, float, float]
 
 
-def write_mask(instance: Instance, path: str | Path) -> Path:
+def write_mask(instance: Instance, path: str | Path, *, force: bool = False) -> Path:
     """Write the mask of an instance as a PNG: white where the field is solved for, black elsewhere.
 
     Parameters
@@ -23,8 +23,11 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
     instance
         An instance that was read from a drawing.
     path
-        File to write. It has the size of the bitmap or page that was read: what `read_sketch` takes as
-        `mask`.
+        File to write, with the suffix .png. It has the size of the bitmap or page that was read: what
+        `read_sketch` takes as `mask`.
+    force
+        Whether to replace a file that crossfield has not written or that has changed since, such as a painted
+        mask.
 
     Returns
     -------
@@ -34,14 +37,16 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
     Raises
     ------
     InputError
-        For an instance from another source, or from a page that is too small or too large for a picture.
+        For an instance from another source, or from a page that is too small or too large for a picture; and
+        for another suffix.
     OutputError
-        If the file cannot be written.
+        If the file cannot be written, or if another one is in the way.
 
     """
     from PIL import Image
 
     path, page = Path(path), _page(instance)
+    require_suffix(path, ".png")
     if page is None:
         raise InputError(
             f"{instance.name} has no page that a mask could cover; give a sketch with a viewBox or a width "
@@ -50,7 +55,7 @@ def write_mask(instance: Instance, path: str | Path) -> Path:
         )
     white = mask_on_page(instance, page)
     image = Image.fromarray(np.where(white, np.uint8(255), np.uint8(0)))
-    with replacing(path) as stream:
+    with replacing(path, force=force) as stream:
         image.save(stream, "PNG")
     return path
 

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final, NamedTuple, Self
 
@@ -26,17 +27,20 @@ from ...models.errors import (
     UnsupportedBySolverError,
 )
 from ...models.field.field import CrossField
+from ...models.field.file import write_field
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Floats
+from ...models.instance.instance import Instance
 from ...models.processes.child import Child, KilledError
 from ...models.processes.child_program import WorkerError
-from ...models.processes.deadline import Deadline, Stop, stop_function
+from ...models.processes.deadline import Deadline, Progress, Stop, silent, stop_function
 from ...models.processes.limits import Limits
-from ...models.storage import make_folder
-from ..bundle.manifest import add_to_manifest
+from ...models.storage import make_folder, replace_results
+from ..bundle.earlier import keep_better_answer, keep_better_field, objective_function
+from ..bundle.manifest import add_to_manifest, file_stem, instance_file
 from ..bundle.problem_files import is_recordable
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
-from ..formats.registry import FORMATS, problem_in_format, write
+from ..formats.registry import FORMATS, file_names, problem_in_format, write
 from ..programs.protocol import (
     FailedError,
     Job,
@@ -68,6 +72,7 @@ def solve(
     limits: Limits | None = None,
     start: CrossField | None = None,
     stop: Stop | None = None,
+    force: bool = False,
 ) -> Solution:
     """Solve a problem with an installed solver, within the time limit, and check the answer.
 
@@ -81,13 +86,17 @@ def solve(
         A name in the table of solvers. None: HiGHS, Ipopt or Bonmin, by the problem's class.
     folder
         The folder that keeps the written file, the log and the solution, with the manifest that reads the
-        solution back. None: they are deleted.
+        solution back. They appear together at the end. A better solution of the same problem by the same
+        solver stays. None: they are deleted.
     limits
         Time limit, gap and threads; `Limits()` by default.
     start
         A field whose complete point is the incumbent or starting point.
     stop
         A function that returns whether to stop, or an event. The best point so far is then returned.
+    force
+        Whether to replace files that crossfield has not written or that have changed since, and a better
+        solution.
 
     Returns
     -------
@@ -107,12 +116,14 @@ def solve(
     SolutionError
         When its answer cannot be read.
     OutputError
-        When a file cannot be written.
+        When a file cannot be written, or if others are in the way.
 
     """
     chosen = choose_solver(problem, solver)
     with Solvers() as solvers:
-        return solvers.solve(problem, chosen.name, folder=folder, limits=limits, start=start, stop=stop)
+        return solvers.solve(
+            problem, chosen.name, folder=folder, limits=limits, start=start, stop=stop, force=force
+        )
 
 
 def choose_solver(problem: Problem, name: str | None = None) -> Solver:
@@ -244,20 +255,55 @@ class Solvers:
         limits: Limits | None = None,
         start: CrossField | None = None,
         stop: Stop | None = None,
+        force: bool = False,
+        field_name: str | None = None,
+        reads: Iterable[str | Path] = (),
+        notice: Progress = silent,
     ) -> Solution:
-        """Solve a problem; parameters, result and errors are those of the function `solve`."""
+        """Solve a problem; parameters, result and errors are those of the function `solve`.
+
+        field_name: of the file in the folder that receives the field of a point without a doubt. reads: files
+        that are never replaced. notice: receives a line about each better result that stays.
+        """
         limits = Limits.finite_or_default(limits)
         deadline = Deadline.after(limits.time_limit)
-        with _open_folder(folder) as place:
-            taking = choose_format(problem, solver)
-            stem = f"{problem.instance.name}.{problem.name}"
-            files = SolveFiles.for_model(place / f"{stem}{FORMATS[taking.format].suffix}", solver)
-            written = write(problem, files.model, start=start if FORMATS[taking.format].has_start else None)
+        taking = FORMATS[choose_format(problem, solver).format]
+        model = f"{file_stem(problem)}{taking.suffix}"
+
+        def solve_in(place: Path) -> Solution:
+            files = SolveFiles.for_model(place / model, solver)
+            written = write(problem, files.model, start=start if taking.has_start else None)
             if folder is not None and is_recordable(problem):
-                add_to_manifest(problem, written, place)
+                add_to_manifest(problem, written, place, Path(folder))
             # Reading the answer takes about as long as writing the problem did.
             search = deadline.later(deadline.left() - limits.time_limit)
             return self.solve_file(written.problem, solver, files, limits, search, start=start, stop=stop)
+
+        if folder is None:
+            with _open_folder() as place:
+                return solve_in(place)
+        names = names_of_solve(problem.instance, problem.name, solver, [taking.name])
+        (log_name, solution_name), failure = names[-2:], None
+        names += [] if field_name is None else [field_name]
+        with replace_results(folder, names, reads=reads, force=force) as new:
+            try:
+                solution = solve_in(new.path.resolve())
+            except SolverError as error:  # its log stays, unless there are earlier results
+                failure = error
+                new.kept.update(name for name in names if (Path(folder) / name).exists())
+            else:
+                field = None if solution.point is None or solution.doubt else solution.field
+                if field_name is not None and field is not None:
+                    write_field(field, new.path / field_name)
+                if not force:
+                    keep_better_answer(new, problem, log_name, solution_name, notice)
+                if field_name is not None and not force:
+                    keep_better_field(
+                        new, field_name, field, notice, on=problem.instance, value=objective_function(problem)
+                    )
+        if failure is not None:
+            raise failure
+        return solution
 
     def solve_file(
         self,
@@ -311,12 +357,12 @@ class Solvers:
                 f"edition, which takes {PROGRAMS[entry.program].free}"
             ) from error
         except (RefusedError, FailedError) as error:
-            raise SolverError(f"{entry.title}: {error}", file=files.model) from error
+            raise SolverError(f"{entry.title}: {error}", file=files.model.name) from error
         except KilledError as error:
             outcome, interrupted = _outcome_of_killed(files, held), error.interrupted
         except WorkerError as error:
             raise SolverError(
-                f"{entry.title}: {error}; its log is {files.log.name}", file=files.model
+                f"{entry.title}: {error}; its log is {files.log.name}", file=files.model.name
             ) from error
         finally:
             files.start.unlink(missing_ok=True)
@@ -335,13 +381,19 @@ class Solvers:
 
 
 @contextmanager
-def _open_folder(path: str | Path | None = None) -> Iterator[Path]:
-    """The given folder, or one that is deleted afterwards."""
-    if path is not None:
-        yield make_folder(path).resolve()
-        return
+def _open_folder() -> Iterator[Path]:
+    """A folder that is deleted afterwards."""
     with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as temporary:
         yield Path(temporary).resolve()
+
+
+def names_of_solve(instance: Instance, name: str, solver: str, forms: Iterable[str]) -> list[str]:
+    """Names of the files of a solve of a formulation, in some formats; log and solution are the last."""
+    stem = f"{instance.name}.{name}"
+    models = [file_names(f"{stem}{FORMATS[form].suffix}", form) for form in forms]
+    files = SolveFiles.for_model(Path(f"{stem}{FORMATS['nl'].suffix}"), solver)
+    others = [instance_file(instance), f"{stem}.manifest.json", files.log.name, files.solution.name]
+    return [*chain.from_iterable(models), *others]
 
 
 def _write_start_file(held: Problem, solver: str, start: CrossField | None, path: Path) -> Path | None:

@@ -23,7 +23,8 @@ from ...models.search.starts import first_field, polyvector_start, start_fields
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from ..solutions.solution import Solution
-from .local import solve
+from ..solvers_table import SOLVERS
+from .local import names_of_solve, solve
 
 if TYPE_CHECKING:
     from ...models.proof.orthogonal_certificate import OrthogonalProof
@@ -117,7 +118,7 @@ class Method:
 
     The last one is its answer. timed: whether it runs up to the time limit, or ends when it is done.
     in_parallel: whether a run does it during other timed methods, because it occupies one processor. takes:
-    whether it finds fields of an instance.
+    whether it finds fields of an instance. solves: formulations whose files it writes, with their solvers.
     """
 
     name: str
@@ -126,6 +127,12 @@ class Method:
     timed: bool = True
     in_parallel: bool = False
     takes: Callable[[Instance], bool] = lambda _: True
+    solves: tuple[tuple[str, str], ...] = ()
+
+    def file_names(self, instance: Instance) -> list[str]:
+        """Names of all files that the solvers of the method may read and write."""
+        names = (names_of_solve(instance, *stage, SOLVERS[stage[1]].formats) for stage in self.solves)
+        return [name for stage in names for name in stage]
 
 
 def _find_greedy(request: Request) -> Iterator[Candidate]:
@@ -224,7 +231,7 @@ def _find_in_two_stages(request: Request) -> Iterator[Candidate]:
     )
     # Without a start HiGHS finds no good field beyond 10 x 10 pixels.
     problem = formulate(request.instance, "milp-mccormick")
-    milp = solve(problem, folder=request.folder, limits=limits, start=start, stop=request.stop)
+    milp = solve(problem, "highs", folder=request.folder, limits=limits, start=start, stop=request.stop)
     yield _solution_candidate("MILP", milp)
     files = time.perf_counter() - begin - (milp.seconds or 0.0)
     if deadline.left() <= files or request.stop():  # those of the second stage take about as long
@@ -287,6 +294,7 @@ METHODS: Final = {
             "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed",
             _find_in_two_stages,
             in_parallel=True,
+            solves=(("milp-mccormick", "highs"), ("qp-fixed", "ipopt")),
         ),
         Method(
             "prove",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Final
 
 from ...models.field.field import CrossField
@@ -43,6 +44,8 @@ class Report:
         Seconds of each stage, in order; `waiting` is the wait for what is computed during others.
     surface
         Surface over the kept field; None if the run stopped earlier.
+    folder
+        The folder of the files.
 
     """
 
@@ -54,6 +57,13 @@ class Report:
     proven: ProvenBound | None = None
     stages: dict[str, float] = field(default_factory=dict)
     surface: Surface | None = None
+    folder: Path = Path()
+
+    def moved_to(self, folder: Path) -> Report:
+        """The report after its files have moved to another folder."""
+        manifests = tuple(manifest.moved_to(folder / "models") for manifest in self.manifests)
+        proven = self.proven and ProvenBound(self.proven.bound, folder / self.proven.certificate.name)
+        return replace(self, folder=folder, manifests=manifests, proven=proven)
 
     @property
     def best(self) -> Candidate:

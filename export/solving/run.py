@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack, nullcontext
@@ -13,7 +14,8 @@ from typing import Final
 
 from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
-from ...models.field.file import write_field
+from ...models.field.file import SAME, earlier_field, write_field
+from ...models.formulations.catalogue import list_formulations
 from ...models.instance.grid import Grid
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
@@ -25,11 +27,12 @@ from ...models.processes.limits import Limits
 from ...models.processes.process_groups import catch_interrupts
 from ...models.processes.process_pool import process_pool
 from ...models.search.starts import first_field
-from ...models.storage import make_folder, remove_file, replacing_files, write_bytes
+from ...models.storage import NewResults, make_folder, replace_results, write_bytes
 from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
-from ..bundle.manifest import Manifest
-from ..bundle.problem_files import write_all
+from ...models.written_files import is_unchanged
+from ..bundle.problem_files import names_of_set, write_all
+from ..formats.registry import DEFAULTS
 from ..pictures.draw import ON_MESHES, draw, draw_layers
 from ..pictures.mask import has_mask, write_mask
 from ..pictures.underlay import Underlay, read_underlay
@@ -37,7 +40,7 @@ from ..surfaces.files import NORMALS, SHADED, write_layers
 from .methods import METHODS, Candidate, Method, Request, methods_of
 from .proven import ProvenBound
 from .report import KEPT, Report, Stopwatch
-from .run_page import REPORT, write_page
+from .run_page import PAGE, REPORT, write_page
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 OVERLAY: Final = ("overlay.svg", "overlay.png")
@@ -45,11 +48,14 @@ OVERLAY: Final = ("overlay.svg", "overlay.png")
 LONGEST_LIFT: Final = 10.0
 """Seconds after which the surface's present heights are kept; grids up to 64 pixels take a few."""
 MASK: Final = "mask.png"
+FIELD: Final = "field.npz"
 LOWEST: Final = "lowest.npz"
 """The field of least 2-norm energy."""
 CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """Name of the field from which the methods of a run start: `first_field`, or the given one."""
+EARLIER: Final = "earlier run"
+"""Name of a better field that an earlier run in the same folder has found."""
 COMPILING: Final = "compiling"
 WAITING: Final = "waiting"
 """Stage in which a run waits for the methods and pictures that are computed during search and proof."""
@@ -73,6 +79,8 @@ def run(
     *,
     limits: Limits | None = None,
     drawing: str | Path | None = None,
+    mask: str | Path | None = None,
+    force: bool = False,
     progress: Progress = silent,
     stop: Stop | None = None,
 ) -> Report:
@@ -93,7 +101,10 @@ def run(
     - DIR/index.html: a page that shows all of these
     - DIR/report.json: written last
 
-    Files of an earlier run stay until the new ones of their kind are complete, also when the run is killed.
+    All files appear together at the end; until then those of an earlier run stay, also when it is killed. For
+    the same instance, an earlier field of less energy and an earlier certificate of a higher bound count as
+    results of this run. If a run is interrupted, earlier pictures of the same field stay. If it has less than
+    an earlier run with another field, all its files go to a folder DIR/new-results.
 
     Orthogonal crosses, and instances on meshes, get the methods that find such fields. On a mesh there are
     two pictures, `instance` and `crosses`, and the page turns the model.
@@ -115,6 +126,11 @@ def run(
         total.
     drawing
         The file or sample from which the instance was read; it is read first.
+    mask
+        The file of the mask with which it was read. If that is DIR/mask.png, it stays as it is.
+    force
+        Whether to replace files that crossfield has not written or that have changed since, and better
+        results. Drawing and mask are never replaced.
     progress
         Receives lines of text.
     stop
@@ -131,27 +147,67 @@ def run(
     InputError
         For limits without a time limit, and for a drawing that is unreadable or has another position.
     OutputError
-        When a file cannot be written.
+        When a file cannot be written, or if others are in the way.
 
     """
-    should_stop = stop_function(stop)
     underlay = None if drawing is None else read_underlay(drawing, on=instance)
-    limits, folder = Limits.finite_or_default(limits), make_folder(folder)
+    limits, folder = Limits.finite_or_default(limits), Path(folder)
+    reads = [path for path in (drawing, mask) if path is not None]
+    names = [name for name in _planned_names(instance) if not _is_same_file(folder / name, mask)]
     progress(plan_sentence(limits, instance))
-    watch = Stopwatch()
-    with _open_parallel_thread(limits) as parallel_thread, ExitStack() as stack:
+    with replace_results(folder, names, reads=reads, force=force) as new:
+        request = Request(instance, new.path / "solve", limits, progress=progress, stop=stop_function(stop))
+        report = _find_and_draw(request, new, underlay, with_earlier=not force)
+        if MASK not in names:
+            shutil.copyfile(folder / MASK, new.path / MASK)
+        elif has_mask(instance):
+            write_mask(instance, new.path / MASK)
+        has_all = not report.interrupted or _take_over(new, names)
+        _write_report(report, new.path)
+        return report.moved_to(folder if has_all else new.set_aside())
+
+
+def _planned_names(instance: Instance) -> list[str]:
+    """Names of all files that a run may write."""
+    sets = [names_of_set(instance, name, DEFAULTS, compress=False) for name in list_formulations(instance)]
+    solves = [method.file_names(instance) for method in methods_of(instance)]
+    pictures = [*map(picture_name, PICTURES), *OVERLAY, NORMALS, SHADED]
+    return [
+        *(f"models/{name}" for names in sets for name in names),
+        *(f"solve/{name}" for names in solves for name in names),
+        *(f"field{suffix}" for suffix in (".npz", ".json", ".obj", ".sings", ".rawfield")),
+        *(LOWEST, CERTIFICATE, MASK, *pictures, PAGE, REPORT),
+    ]
+
+
+def _is_same_file(path: Path, other: str | Path | None) -> bool:
+    """Whether two paths lead to the same file."""
+    return other is not None and path.exists() and Path(other).exists() and path.samefile(other)
+
+
+def _find_and_draw(
+    request: Request, new: NewResults, underlay: Underlay | None, *, with_earlier: bool
+) -> Report:
+    """Write the solver files, find fields, write them with their certificate, and draw the kept one.
+
+    with_earlier: whether better results of an earlier run count.
+    """
+    instance, progress, should_stop, watch = request.instance, request.progress, request.stop, Stopwatch()
+    with _open_parallel_thread(request.limits) as parallel_thread, ExitStack() as stack:
         with _compiling_in_background(instance):
             progress("greedy field")
             start = first_field(instance)
             watch.lap(START)
-            manifests = _write_models(instance, folder, start, progress)
+            manifests = write_all(
+                instance, new.path / "models", start=start, progress=lambda name: progress(f"writing {name}")
+            )
             watch.lap("models")
-            request = Request(instance, folder / "solve", limits, start, progress=progress, stop=should_stop)
             results = _Results([Candidate(START, start, watch.stages[START])])
+            request = replace(request, start=start)
             _find_fields(results, request, lambda method: not method.timed, watch)
             pressed = stack.enter_context(catch_interrupts())
             request = replace(request, stop=lambda: should_stop() or pressed())
-            work = (request, folder, underlay, results.kept_field, results.interrupted)
+            work = (request, new.path, underlay, results.kept_field, results.interrupted)
             parallel_work = parallel_thread.submit(_work_in_parallel, *work)
             results.interrupted = results.interrupted or _compile_functions(request)
             watch.lap(COMPILING)
@@ -160,24 +216,38 @@ def run(
         others, pictures = parallel_work.result()
         results.add(others)
         watch.lap(WAITING)
-        report = Report(instance, results.ranked, manifests, results.failures, results.interrupted)
-        names = _write_fields(report, folder)
+        if with_earlier:
+            results.add_earlier(earlier_field(new.folder / LOWEST, instance))
+        report = Report(instance, results.ranked, tuple(manifests), results.failures, results.interrupted)
+        _write_fields(report, new.path)
         watch.lap("fields")
-        report = _write_certificate(report, folder / CERTIFICATE)
+        report = _write_certificate(report, new, with_earlier=with_earlier)
         watch.lap("certificate")
         if pictures is None:
-            pictures = _Pictures(report.kept.field, underlay, request, report.interrupted).draw_all(folder)
+            pictures = _Pictures(report.kept.field, underlay, request, report.interrupted).draw_all(new.path)
             watch.lap("pictures")
-    report = replace(
+    return replace(
         report,
         surface=pictures.surface,
         failures=report.failures | pictures.failures,
         interrupted=report.interrupted or pictures.interrupted,
         stages=watch.stages,
     )
-    names |= pictures.names | ({CERTIFICATE} if report.proven else set())
-    _write_report(report, folder, names)
-    return report
+
+
+def _take_over(new: NewResults, names: list[str]) -> bool:
+    """Copy what an interrupted run lacks from an earlier run with the same field.
+
+    Returns whether the new files are then no fewer than the earlier ones.
+    """
+    lacking = [name for name in names if not (new.path / name).exists() and is_unchanged(new.folder / name)]
+    earlier = new.folder / FIELD
+    if not (is_unchanged(earlier) and earlier.read_bytes() == (new.path / FIELD).read_bytes()):
+        return not lacking
+    for name in lacking:
+        make_folder((new.path / name).parent)
+        shutil.copyfile(new.folder / name, new.path / name)
+    return True
 
 
 def _open_parallel_thread(limits: Limits) -> AbstractContextManager[Executor]:
@@ -204,25 +274,11 @@ def _work_in_parallel(
     return results, _Pictures(kept, underlay, request, results.interrupted).draw_all(folder)
 
 
-def _write_models(
-    instance: Instance, folder: Path, start: CrossField, progress: Progress
-) -> tuple[Manifest, ...]:
-    """Write every formulation in every format to DIR/models; return the manifests."""
-    models = folder / "models"
-    with replacing_files(models) as new:
-        manifests = write_all(instance, new, start=start, progress=lambda name: progress(f"writing {name}"))
-    return tuple(replace(manifest, path=models / manifest.path.name) for manifest in manifests)
-
-
-def _write_fields(report: Report, folder: Path) -> set[str]:
-    """Write the kept field, the lowest one and the mask, and return the names of the files."""
-    with replacing_files(folder) as new:
-        for suffix in (".npz", ".json", ".rawfield"):
-            write_field(report.kept.field, new / f"field{suffix}")
-        write_field(report.best.field, new / LOWEST)
-        if has_mask(report.instance):
-            write_mask(report.instance, new / MASK)
-        return {path.name for path in new.iterdir()}
+def _write_fields(report: Report, folder: Path) -> None:
+    """Write the kept field and the lowest one."""
+    for name in (FIELD, "field.json", "field.rawfield"):
+        write_field(report.kept.field, folder / name)
+    write_field(report.best.field, folder / LOWEST)
 
 
 @dataclass
@@ -238,6 +294,12 @@ class _Results:
         self.candidates += others.candidates
         self.failures |= others.failures
         self.interrupted = self.interrupted or others.interrupted
+
+    def add_earlier(self, field: CrossField | None) -> None:
+        """Add the field of an earlier run, if it is better than all that were found."""
+        least = min(candidate.field.energy().total for candidate in self.candidates)
+        if field is not None and field.energy().total < least - SAME * least:
+            self.candidates.append(Candidate(EARLIER, field, 0.0))
 
     @property
     def kept_field(self) -> CrossField | None:
@@ -303,17 +365,26 @@ def _find_fields(
             watch.lap(method.name)
 
 
-def _write_certificate(report: Report, path: Path) -> Report:
-    """Write the certificate of the proven bound; return the report with the bound, a failure or Ctrl-C."""
+def _write_certificate(report: Report, new: NewResults, *, with_earlier: bool) -> Report:
+    """Write the certificate of the proven bound; return the report with the bound, a failure or Ctrl-C.
+
+    with_earlier: whether a certificate of an earlier run with a higher bound counts.
+    """
+    from ...models.proof.certificate import earlier_bound  # it loads Numba
+
     proof = next((candidate.proof for candidate in report.candidates if candidate.proof is not None), None)
-    if proof is None:
-        return report
+    path = new.path / CERTIFICATE
     try:
-        return replace(report, proven=ProvenBound.write(proof, path))
+        if proof is not None:
+            report = replace(report, proven=ProvenBound.write(proof, path))
     except CrossfieldError as error:
         report.failures["certificate"] = str(error)
     except KeyboardInterrupt:
-        return replace(report, interrupted="certificate")
+        report = replace(report, interrupted="certificate")
+    earlier = earlier_bound(new.folder / CERTIFICATE, report.instance) if with_earlier else None
+    if earlier is not None and (report.proven is None or earlier > report.proven.bound):
+        shutil.copyfile(new.folder / CERTIFICATE, path)
+        report = replace(report, proven=ProvenBound(earlier, path))
     return report
 
 
@@ -323,7 +394,7 @@ class _Pictures:
 
     In this process they would hold up the other thread, because Python runs one of them at a time.
 
-    names: of the files. failures: reasons by name of what is missing. interrupted: `drawing` or `surface` if
+    failures: reasons by name of what is missing. interrupted: `drawing` or `surface` if
     Ctrl-C or the caller ended that; before, what they ended earlier, so that nothing is drawn.
     """
 
@@ -331,7 +402,6 @@ class _Pictures:
     underlay: Underlay | None
     request: Request
     interrupted: str
-    names: set[str] = field(default_factory=set)
     surface: Surface | None = None
     failures: dict[str, str] = field(default_factory=dict)
 
@@ -339,14 +409,13 @@ class _Pictures:
         """Draw the field and its surface, unless the run was interrupted; return itself."""
         if self.interrupted:
             return self
-        with replacing_files(folder) as new, Child() as child:
+        with replace_results(folder, ()) as new, Child() as child:
             try:
-                self._draw_field(child, new)
+                self._draw_field(child, new.path)
                 if not self.interrupted and isinstance(self.kept.instance.domain, Grid):
-                    self._draw_surface(child, new)
+                    self._draw_surface(child, new.path)
             except KeyboardInterrupt:
                 self.interrupted = "drawing"
-            self.names = {path.name for path in new.iterdir()}
         return self
 
     def _draw_field(self, child: Child, folder: Path) -> None:
@@ -385,12 +454,11 @@ def lift_and_draw(kept: CrossField, folder: Path, underlay: Underlay | None) -> 
     return lifted
 
 
-def _write_report(report: Report, folder: Path, names: set[str]) -> None:
-    """Write page and report, and remove files of an earlier run that this one did not replace."""
+def _write_report(report: Report, folder: Path) -> None:
+    """Write page and report."""
     document = report.document()
+    names = {path.name for path in folder.iterdir()}
     write_page(folder, document, report.manifests, names, report.kept.field)
-    for name in {CERTIFICATE, MASK, NORMALS, SHADED, *OVERLAY, *map(picture_name, PICTURES)} - names:
-        remove_file(folder / name)
     write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
 
 

@@ -122,7 +122,7 @@ def download(data: bytes, kind: str, formulation: str = "", form: str = "") -> t
     with tempfile.TemporaryDirectory(prefix="crossfield-") as name:
         folder = Path(name)
         DOWNLOADS[kind].write(document, folder, formulation, form)
-        files = sorted(path for path in folder.rglob("*") if path.is_file())
+        files = sorted(path for path in folder.rglob("[!.]*") if path.is_file())
         if len(files) == 1:
             return files[0].name, files[0].read_bytes()
         return f"{document.name}.{kind}.zip", _pack_files(files, folder)

@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from ...models.field.triangles import vertices_of
 from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
-from ...models.storage import make_folder, write_bytes
+from ...models.storage import replace_results, write_bytes
 from ...models.surface.surface import Surface
 from ...models.surface.trust import describe_support, right_angle_deviation
+from ...models.written_files import check_targets
 from ..formats.registry import program_version
 from ..pictures.layers import strokes_sheet
 from ..pictures.svg import render_sheet
@@ -70,10 +71,11 @@ def write_surface(
     light: Light = UPPER_LEFT,
     side: int | None = None,
     about: Mapping[str, Any] | None = None,
+    force: bool = False,
 ) -> Path:
     """Write a surface as pictures, heights, a mesh and a report. Equal surfaces give equal bytes.
 
-    Every file is complete or absent, and the report is written last.
+    All files appear together at the end.
 
     Parameters
     ----------
@@ -91,6 +93,9 @@ def write_surface(
         1024.
     about
         Facts for the report on how the surface was made.
+    force
+        Whether to replace files that crossfield has not written or that have changed since. The drawing is
+        never replaced.
 
     Returns
     -------
@@ -102,14 +107,14 @@ def write_surface(
     InputError
         For a drawing that is unreadable or does not match the instance, and for a side out of range.
     OutputError
-        If a file cannot be written.
+        If a file cannot be written, or if others are in the way.
 
     """
+    reads = [drawing] if isinstance(drawing, str | Path) else []
+    check_targets(Path(folder), FILES, reads=reads, force=force)
     if drawing is not None and not isinstance(drawing, Underlay):
         drawing = read_underlay(drawing, on=surface.instance)
     view = choose_view(surface.instance, drawing, side)
-    folder = make_folder(folder)
-    (folder / REPORT).unlink(missing_ok=True)
     normals, shaded, glazed = paint_surface(
         surface, drawing, view, colour_normals, lambda part: shade_by_light(part, light), matcap
     )
@@ -122,16 +127,19 @@ def write_surface(
         "overlay.png": lay_over(ink, shaded),
         DRAWING: lay_over(ink, paper)[..., :3],
     }
-    for name, picture in pictures.items():
-        write_bytes(folder / name, encode_png(picture))
+    document = surface_document(surface, view, about) | {"files": FILES}
     heights = io.BytesIO()
     np.save(heights, surface.heights, allow_pickle=False)
-    write_bytes(folder / "heights.npy", heights.getvalue())
-    write_bytes(folder / MATERIALS, _MTL.encode())
-    write_bytes(folder / "surface.obj", to_obj(surface, MATERIALS, view.box))
-    document = surface_document(surface, view, about) | {"files": FILES}
-    write_bytes(folder / REPORT, (json.dumps(document, indent=1, allow_nan=False) + "\n").encode())
-    return folder
+    contents = {name: encode_png(picture) for name, picture in pictures.items()} | {
+        "heights.npy": heights.getvalue(),
+        MATERIALS: _MTL.encode(),
+        "surface.obj": to_obj(surface, MATERIALS, view.box),
+        REPORT: (json.dumps(document, indent=1, allow_nan=False) + "\n").encode(),
+    }
+    with replace_results(folder, contents, reads=reads, force=force) as new:
+        for name, content in contents.items():
+            (new.path / name).write_bytes(content)
+    return Path(folder)
 
 
 def write_layers(surface: Surface, folder: Path, drawing: Underlay | None = None) -> None:

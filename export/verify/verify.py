@@ -29,7 +29,8 @@ from ...models.orthogonal.energy import OrthogonalEnergy, field_of, integers_of
 from ...models.packed import unpack
 from ...models.processes.deadline import Deadline
 from ...models.processes.limits import Limits
-from ...models.storage import read_bytes, sha256_of, write_bytes
+from ...models.storage import read_bytes, write_bytes
+from ...models.written_files import check_targets, sha256_of
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, problem_in_format
 from ..programs.model_content import Points
@@ -87,19 +88,22 @@ def verify(
     *,
     seconds: float | None = None,
     programs: list[str] | None = None,
+    force: bool = False,
     progress: Callable[[str], None] = lambda _: None,
 ) -> Verification:
     """Check all the files in a folder with all installed programs.
 
     Also writes verify.json there. seconds: for each solve; None: nothing is solved. programs: names, all by
-    default. progress: called with each file and program. Raises InputError when the folder holds no manifest,
-    and the errors of reading manifests.
+    default. force: whether to replace a verify.json that crossfield has not written or that has changed.
+    progress: called with each file and program. Raises InputError when the folder holds no manifest,
+    OutputError, and the errors of reading manifests.
     """
     folder = Path(folder)
     wanted = [PROGRAMS[name] for name in programs or PROGRAMS]
     manifests = [read_manifest(path) for path in sorted(folder.glob("*.manifest.json"))]
     if not manifests:
         raise InputError("holds no manifest; give the folder that `crossfield export` wrote", file=folder)
+    check_targets(folder, [RESULT], force=force)
     verification = Verification(
         folder,
         absent={
@@ -118,7 +122,7 @@ def verify(
                     progress(f"{subject.name}: {program.title}")
                     verification.checks.extend(bench.checks(subject))
     verification.checks[:] = judge_solves(verification.checks)
-    write_bytes(folder / RESULT, (json.dumps(verification.document(), indent=1) + "\n").encode())
+    write_bytes(folder / RESULT, (json.dumps(verification.document(), indent=1) + "\n").encode(), force=force)
     return verification
 
 

@@ -48,14 +48,14 @@ def is_packed(path: Path) -> bool:
     return path.suffix.lower() == ".gz"
 
 
-def save_file(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
+def save_file(path: Path, chunks: Iterable[bytes], *, force: bool = False) -> dict[str, Any]:
     """Write a file, compressed if `is_packed(path)`; return its size and SHA-256. Raises OutputError."""
-    with pending_file(path, chunks) as facts:
+    with pending_file(path, chunks, force=force) as facts:
         return facts
 
 
 @contextmanager
-def pending_file(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]]:
+def pending_file(path: Path, chunks: Iterable[bytes], *, force: bool = False) -> Iterator[dict[str, Any]]:
     """Size and SHA-256 of a file that gets its name at the end of the context, as `save_file` writes it.
 
     The bytes are written, under a temporary name, when the context begins. An error inside it leaves no file.
@@ -66,7 +66,7 @@ def pending_file(path: Path, chunks: Iterable[bytes]) -> Iterator[dict[str, Any]
         for chunk in share:
             digest.update(chunk)
 
-    with replacing(path) as stream:
+    with replacing(path, force=force, sha256=digest.hexdigest) as stream:
         with _Pipeline(hash_all, stream.writelines) as beside:
             for share, length in gather_chunks(gzip_chunks(chunks) if is_packed(path) else chunks, SHARE):
                 beside(share, wait=length < SHARE)

@@ -31,7 +31,6 @@ from .triangles import field_of_vectors, mesh_of, singular_vertices, triangle_co
 Lines = list[tuple[int, bytes]]
 """Lines of a file and their numbers, from 1."""
 
-OF_MESH: Final = b"# the mesh of a cross field of crossfield: "
 """How the .obj of a mesh begins, by which it differs from the user's own mesh."""
 
 _COMPONENTS: Final = ("ux", "uy", "uz", "vx", "vy", "vz")
@@ -57,9 +56,9 @@ def to_obj(instance: Instance) -> bytes:
     of_pixels = (
         f"# {instance.name}: triangles 2k - 1 and 2k are pixel k = 1, 2, ... of the mask, row by row; y up"
     )
-    head = OF_MESH + instance.name.encode() if on_mesh else of_pixels.encode()
+    head = f"# the mesh of a cross field of crossfield: {instance.name}" if on_mesh else of_pixels
     rows = _text_of_rows(mesh.vertices, "v ") + _text_of_rows(mesh.faces + 1, "f ")
-    return head + b"\n" + rows.encode()
+    return f"{head}\n{rows}".encode()
 
 
 def to_sings(field: CrossField) -> bytes:

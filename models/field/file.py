@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
 
 from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
-from ..errors import InputError, InstanceError, OutputError, naming
+from ..errors import CrossfieldError, InputError, InstanceError, OutputError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.angles import MOST_ANGLE
 from ..instance.domain import Bools, Floats, Ints
@@ -34,9 +35,10 @@ from ..instance.file import (
 from ..instance.grid import Grid
 from ..instance.instance import Instance
 from ..instance.mesh import MOST_FACES, Mesh
-from ..storage import read_bytes, write_bytes
-from .exchange import OF_MESH, TEXT_READERS, TEXT_WRITERS, most_text_bytes, to_obj, to_sings
-from .field import CrossField
+from ..storage import read_bytes, replacing
+from ..written_files import FORCE, check_targets, is_unchanged
+from .exchange import TEXT_READERS, TEXT_WRITERS, most_text_bytes, to_obj, to_sings
+from .field import CrossField, Norm
 
 FORMAT: Final = "crossfield-field"
 VERSION: Final = 1
@@ -48,10 +50,12 @@ _ARCHIVE: Final = {
     "p": ExpectedArray(1, 2 * MAX_GRID**2),
 }
 _MOST_JUMP: Final = 1_000_000
+_NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
+SAME: Final = 1e-9  # relative difference of energies up to which none is the lower one
 _Entry = TypeVar("_Entry")
 
 
-def write_field(field: CrossField, path: str | Path) -> Path:
+def write_field(field: CrossField, path: str | Path, *, force: bool = False) -> Path:
     """Write a field. Equal fields give equal bytes.
 
     Parameters
@@ -61,6 +65,9 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     path
         File to write; the suffix .npz, .json, .rawfield, .rosy, .ply or .vtk selects the format. A .rawfield
         and a .rosy come with their mesh (.obj), a .rawfield with its singularities (.sings).
+    force
+        Whether to replace files that crossfield has not written or that have changed since, and a better
+        field: one on the same instance with less energy in every norm.
 
     Returns
     -------
@@ -72,28 +79,50 @@ def write_field(field: CrossField, path: str | Path) -> Path:
     InputError
         For another suffix.
     OutputError
-        If a file cannot be written, or if the .obj would replace a mesh that crossfield has not written.
+        If a file cannot be written, or is in the way and not replaced unless forced.
 
     """
     path = Path(path)
     write = _look_up_suffix(_WRITERS, path, "written")
-    if path.suffix.lower() in {".rawfield", ".rosy"}:
-        _write_mesh(field.instance, path.with_suffix(".obj"))
-    if path.suffix.lower() == ".rawfield":
-        write_bytes(path.with_suffix(".sings"), to_sings(field))
-    return write_bytes(path, write(field))
+    names = field_names(path.name)
+    check_targets(path.parent, names, force=force)
+    if not force:
+        _check_not_worse(field, path)
+    contents: list[Callable[[CrossField], bytes]] = [write, lambda field: to_obj(field.instance), to_sings]
+    with ExitStack() as stack:  # the files get their names together, at its end
+        for name, content in zip(names, contents, strict=False):
+            stack.enter_context(replacing(path.with_name(name), force=force)).write(content(field))
+    return path
 
 
-def _write_mesh(instance: Instance, path: Path) -> None:
-    """Write the mesh beside a field, which often has the name of the part that the instance was read from."""
-    if isinstance(instance.domain, Mesh) and path.exists():
-        with path.open("rb") as file:
-            if file.read(len(OF_MESH)) != OF_MESH:
-                raise OutputError(
-                    "is a mesh that would be replaced by that of the field; give the field another name",
-                    file=path,
-                )
-    write_bytes(path, to_obj(instance))
+def field_names(name: str) -> list[str]:
+    """The name of the file of a field, and those of its mesh and its singularities if they come with it."""
+    companions = {".rawfield": [".obj", ".sings"], ".rosy": [".obj"]}
+    path = Path(name)
+    return [name, *(path.with_suffix(suffix).name for suffix in companions.get(path.suffix.lower(), []))]
+
+
+def earlier_field(path: Path, on: Instance) -> CrossField | None:
+    """The field on this instance that crossfield wrote to a file and nobody changed; None without one."""
+    try:
+        return read_field(path, on=on) if is_unchanged(path) else None
+    except CrossfieldError:
+        return None
+
+
+def _check_not_worse(field: CrossField, path: Path) -> None:
+    """Raise OutputError if a field would replace a better one."""
+    earlier = earlier_field(path, field.instance)
+    if earlier is None:
+        return
+    energies = [(earlier.energy(norm).total, field.energy(norm).total) for norm in _NORMS]
+    if all(was < now - SAME * now for was, now in energies):
+        was, now = energies[0]
+        raise OutputError(
+            f"has a field of lower energy ({was:.6g}, now {now:.6g}) in every norm; choose another name, or "
+            f"replace it with {FORCE}",
+            file=path,
+        )
 
 
 def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:

@@ -20,7 +20,7 @@ import numpy as np
 from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
-from ..storage import read_bytes, write_bytes
+from ..storage import read_bytes, require_suffix, write_bytes
 from .domain import Floats
 from .grid import Grid
 from .instance import Instance
@@ -58,7 +58,7 @@ _MESH_ARCHIVE: Final = {
 _WEIGHTS: Final = {"pair_weights": ExpectedArray(1, max(2 * MAX_GRID**2, 2 * MOST_FACES))}
 
 
-def write_instance(instance: Instance, path: str | Path) -> Path:
+def write_instance(instance: Instance, path: str | Path, *, force: bool = False) -> Path:
     """Write an instance. Equal instances give equal bytes.
 
     Parameters
@@ -66,7 +66,9 @@ def write_instance(instance: Instance, path: str | Path) -> Path:
     instance
         The instance.
     path
-        File to write: NumPy's .npz if the name has this suffix, otherwise JSON.
+        File to write; the suffix .json or .npz selects the format.
+    force
+        Whether to replace a file that crossfield has not written or that has changed since.
 
     Returns
     -------
@@ -75,15 +77,17 @@ def write_instance(instance: Instance, path: str | Path) -> Path:
 
     Raises
     ------
+    InputError
+        For another suffix.
     OutputError
-        If the file cannot be written.
+        If the file cannot be written, or if another one is in the way.
 
     """
     path = Path(path)
+    require_suffix(path, ".json", ".npz")
     packed = path.suffix.lower() == ".npz"
-    return write_bytes(
-        path, pack_arrays(instance_arrays(instance)) if packed else instance_to_json(instance).encode()
-    )
+    content = pack_arrays(instance_arrays(instance)) if packed else instance_to_json(instance).encode()
+    return write_bytes(path, content, force=force)
 
 
 def read_instance(path: str | Path) -> Instance:

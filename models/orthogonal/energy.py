@@ -192,10 +192,11 @@ class OrthogonalEnergy:
                 break
             step = np.where(residual[row] > 0, -1, 1).astype(np.int32)
             moved = self.step_residuals(residual, row, step)
-            failed[row] = self.total(moved) >= lowered(total)
+            reached = self.total(moved)
+            failed[row] = reached >= lowered(total)
             if not failed[row]:
                 z[row] += step
-                residual, total, failed[:] = moved, self.total(moved), False
+                residual, total, failed[:] = moved, reached, False
         while self.size > MOST_DENSE and not over():
             nearest = z - np.round(np.round(residual / HALF, 9)).astype(np.int32)
             moved = self.residuals(self.fit_angles(nearest), nearest)

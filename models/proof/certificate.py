@@ -16,7 +16,7 @@ from typing import Any, Final, cast
 import numpy as np
 
 from ..array_archive import Arrays, pack_arrays
-from ..errors import InputError, InstanceError, SolverError, naming
+from ..errors import CrossfieldError, InputError, InstanceError, OutputError, SolverError, naming
 from ..field.field import CrossField, Norm
 from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
@@ -24,7 +24,8 @@ from ..processes.deadline import Progress, silent
 from ..processes.job_counts import check_jobs
 from ..processes.process_groups import are_interrupts_caught
 from ..processes.process_pool import process_pool
-from ..storage import read_bytes, write_bytes
+from ..storage import read_bytes, require_suffix, write_bytes
+from ..written_files import FORCE, check_targets, is_unchanged
 from . import check_certificate, check_orthogonal
 from .check_certificate import ProvenClaim
 from .orthogonal_certificate import OrthogonalProof
@@ -69,7 +70,9 @@ class Certificate(Claim):
         return self.proven.forced
 
 
-def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certificate:
+def write_certificate(
+    proof: Proof | OrthogonalProof, path: str | Path, *, force: bool = False
+) -> Certificate:
     """Write the certificate of a proof, as far as the checker confirms it.
 
     The certificate may claim less than the proof. The same proof gives the same bytes.
@@ -79,7 +82,10 @@ def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certi
     proof
         The proof.
     path
-        The file to write.
+        The file to write, with the suffix .npz.
+    force
+        Whether to replace a file that crossfield has not written or that has changed since, and a certificate
+        of a higher bound for the same instance and norm.
 
     Returns
     -------
@@ -89,22 +95,24 @@ def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certi
     Raises
     ------
     InputError
-        For a proof that the checker refuses.
+        For a proof that the checker refuses, and for another suffix.
     SolverError
         For a proof without levels.
     OutputError
-        When the file cannot be written.
+        When the file cannot be written, or if another one is in the way.
 
     """
     path = Path(path)
+    require_suffix(path, ".npz")
+    check_targets(path.parent, [path.name], force=force)
     if not proof.levels:
         reason = proof.reason or "no level was completed"
         raise SolverError(f"is not written: nothing was proven, because {reason}", file=path)
     if isinstance(proof, OrthogonalProof):
         if proof.proven is None:
             raise InputError("would hold a proof that is not valid; prove it again", file=path)
-        write_bytes(path, pack_arrays(proof.certificate()))
-        return Certificate(proof.field, proof.energy, proof.bound, proof.proven)
+        certificate = Certificate(proof.field, proof.energy, proof.bound, proof.proven)
+        return _write_arrays(certificate, proof.certificate(), path, force=force)
     try:
         checked = proof if proof.proven is not None else check_proof(proof)
     except REFUSALS as error:
@@ -112,31 +120,64 @@ def write_certificate(proof: Proof | OrthogonalProof, path: str | Path) -> Certi
     except MemoryError as error:
         raise SolverError("is not written: its check takes more memory than there is", file=path) from error
     proven = cast("ProvenClaim", checked.proven)
-    write_bytes(
-        path, pack_arrays(_head_arrays(checked) | _proof_arrays(checked) | cast("Arrays", checked.pieces))
-    )
-    return Certificate(checked.field, checked.energy, checked.bound, proven)
+    arrays = _head_arrays(checked) | _proof_arrays(checked) | cast("Arrays", checked.pieces)
+    certificate = Certificate(checked.field, checked.energy, checked.bound, proven)
+    return _write_arrays(certificate, arrays, path, force=force)
+
+
+def _write_arrays(certificate: Certificate, arrays: Arrays, path: Path, *, force: bool) -> Certificate:
+    """Write the arrays of a certificate, unless an earlier one has a higher bound; return it."""
+    earlier = None if force else earlier_bound(path, certificate.field.instance, certificate.norm)
+    if earlier is not None and earlier > certificate.bound:
+        raise OutputError(
+            f"has a proof of a higher bound ({earlier:.6g}, now {certificate.bound:.6g}); choose another "
+            f"name, or replace it with {FORCE}",
+            file=path,
+        )
+    write_bytes(path, pack_arrays(arrays), force=force)
+    return certificate
+
+
+def earlier_bound(path: Path, on: Instance, norm: Norm = 2) -> float | None:
+    """The bound for an instance in a norm that a certificate in a file proves.
+
+    It was checked when it was written. None without a certificate that crossfield wrote and nobody changed,
+    and for another instance or norm.
+    """
+    if not is_unchanged(path):
+        return None
+    try:
+        arrays = check_certificate.unpack_archive(read_bytes(path, check_certificate.MOST_BYTES))
+        head = check_certificate.refuse_damage(check_certificate.json_of)(arrays, "head")
+        is_same = _field_of(arrays).instance.sha256 == on.sha256 and head.get("norm", 2) == norm
+    except (CrossfieldError, *REFUSALS):
+        return None
+    return float(head["bound"]) if is_same else None
 
 
 def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Proof:
     """The proof with the checker's findings, and with the bound and the forced jumps that it confirms.
 
     After Ctrl-C, the proof has only the levels that are checked. KeyboardInterrupt is raised without any, and
-    in a block that catches Ctrl-C itself.
+    in a block that catches Ctrl-C itself. Last levels whose check takes more memory than a reader grants are
+    left out.
 
     jobs: as of `read_certificate`. Raises one of `REFUSALS` for a proof that does not hold, and WorkerError
     when a process dies.
     """
+    while not _takes_memory_of_file(proof) and len(proof.levels) > 1:
+        proof = replace(proof, levels=proof.levels[:-1], bound=0.0, forced=0, ended="labels", pieces=None)
     arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
     closed = proof.status == "optimal" or proof.forced == len(proof.levels[0].p)
     has_pieces = proof.pieces is not None or closed
-    with _pass_function(arrays, jobs, progress) as pass_all:
+    with _pass_function(arrays, jobs, silent) as pass_all:
 
         def pass_until_interrupted(work: Any, tasks: list[Any]) -> list[Any]:
             passes = list[Any]()
             try:
                 for level_pass in pass_all(work, tasks):
-                    passes.append(level_pass)
+                    passes.append(level_pass)  # before the report, which Ctrl-C may interrupt
+                    progress(f"checked {len(passes)} of {len(tasks)} levels")
             except KeyboardInterrupt:
                 if not passes or are_interrupts_caught():
                     raise
@@ -154,6 +195,16 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
     checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended, pieces=pieces)
     object.__setattr__(checked, "proven", proven)
     return checked
+
+
+def _takes_memory_of_file(proof: Proof) -> bool:
+    """Whether the check of a proof takes at most the memory that its certificate may take."""
+    arrays = _head_arrays(proof) | _proof_arrays(proof)
+    for pack in (False, True):  # packing takes long, and a small level fits without
+        with suppress(check_certificate.UnreadableError):
+            check_certificate.check_memory(arrays, len(pack_arrays(arrays)) if pack else 0)
+            return True
+    return False
 
 
 @contextmanager

@@ -33,7 +33,7 @@ from ..processes.limits import Limits
 from ..search.improvement import improved_field
 from ..search.search import search
 from ..search.starts import polyvector_start, start_fields
-from .check_certificate import MOST_COUNT, has_forced_jump
+from .check_certificate import MOST_COUNT, has_forced_jump, level_memory, memory_for
 from .clusters import table_sizes
 from .dual import Dual
 from .last_step import energy_terms, has_few_open, last_step_on, minimise_on_boxes
@@ -46,6 +46,7 @@ from .rounding import Rounding, better_field
 COARSEST: Final = 16  # steps in pi/2 of the first level, whose passes cost least
 _FINEST: Final = 2**16  # steps in pi/2 of the last one: finer ones come near the digits of centres
 MOST_LABELS: Final = 50_000_000  # labels of a level, for memory: each takes some 100 bytes
+_OF_SHARE: Final = 32  # bytes of memory that the checker grants for each share, beside those for the share
 _TABLES: Final = 4  # numbers of tables that take as much memory as a label
 _DECIMALS: Final = 7  # digits of centres in rad: their last digits differ between processors
 _SETTLED: Final = 4  # spacings after which little is lost where the centre is another field
@@ -73,6 +74,7 @@ _WIDE: Final = 0.01  # relative gap of a level above which a poor field may caus
 _FIRST_SEARCH: Final = 3.0  # seconds after which a proof searches: many need none
 _NEXT_SEARCH: Final = 4.0  # times as late as a search, the next one
 _SEARCH: Final = (0.05, 0.25)  # share of the time left, and of the time before, that a search takes at most
+_CLOSED: Final = 0.95  # share of the time left for a search, whose last solve takes a little more
 _ROUNDS: Final = 5  # rounds of the search without a limit of time
 
 _ROUGH: Final = 1e-5  # gap, of 1 + energy, as if of which a first smaller one is rounded: few digits may do
@@ -146,6 +148,8 @@ class Descent:
     searches: int = 0
     next_search: float = _FIRST_SEARCH
     began: float = 0.0
+    took: float = 0.0  # seconds of the last chain
+    tired: bool = False  # whether the last search ended because it found nothing for long
 
     @staticmethod
     def first_field(instance: Instance, _norm: Norm, start: CrossField | None, over: Over) -> CrossField:
@@ -181,8 +185,10 @@ class Descent:
         """Go through chains of levels until a limit is met or nothing helps; return the reason."""
         self.began, ended = time.monotonic(), ""
         try:
-            while not ended:
+            while not ended or (ended == "labels" and self._search_on()):
+                begin = time.monotonic()
                 ended = self._go_through_levels()
+                self.took = time.monotonic() - begin
         except MemoryError:
             ended = "memory"
         return self.ends.reason() or ended
@@ -297,8 +303,24 @@ class Descent:
             due = spent >= self.next_search
         else:
             due = not self.searches and self.gap > _WIDE * self.energy(self.best)
-        if not due or self.ends.over(seconds):
-            return
+        if due and not self.ends.over(seconds):
+            self._search(seconds if timed else math.inf)
+            self.next_search = _NEXT_SEARCH * spent
+
+    def _search_on(self) -> bool:
+        """Search for the time that no level uses; whether a better field is found in time for a chain."""
+        while not self.ends.over():
+            left = _CLOSED * self.ends.deadline.left()
+            chain = left > 2 * self.took
+            if self._search(left / 2 if chain else left) and chain:
+                return True
+            if self.tired or not chain or left == math.inf:
+                break
+        return False
+
+    def _search(self, seconds: float, /) -> bool:
+        """Whether a search of so many seconds, or for inf of some rounds, finds a better field."""
+        timed, least = math.isfinite(seconds), self.energy(self.best)
         result = search(
             self.instance,
             limits=Limits().until(self.ends.deadline.within(seconds)) if timed else None,
@@ -309,8 +331,9 @@ class Descent:
             progress=lambda line: self.progress(f"search: {line}"),
             stop=self.ends.stop,
         )
-        self.searches, self.next_search = self.searches + 1, _NEXT_SEARCH * spent
+        self.searches, self.tired = self.searches + 1, result.ended == "patience"
         self.best = min(self.best, result.field, key=self.energy)
+        return self.energy(self.best) < least * (1 - _BETTER)
 
     def _has_time_for(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for a level on the next lattice: its record, and passes that take as long."""
@@ -357,7 +380,9 @@ def _is_too_large(dual: Dual, lattice: Lattice) -> bool:
     """Whether the next level of a dual is beyond what memory, checker or digits of an angle allow."""
     tables = int(table_sizes(lattice, dual.quads).sum())
     many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
-    many = many or bool(max(lattice.alpha_count.max(), lattice.beta_count.max()) > MOST_COUNT)
+    counts, grid = np.stack([lattice.alpha_count, lattice.beta_count], axis=1), lattice.instance.grid
+    stored = int(lattice.allowed_count[np.minimum(grid.first, grid.second)].sum())
+    many = many or counts.max() > MOST_COUNT or level_memory(counts, 0, 0) > memory_for(stored, _OF_SHARE)
     return many or lattice.h < np.pi / 2 / _FINEST
 
 

@@ -185,7 +185,7 @@ class _Prover:
                 reason = self._go_through_levels()
                 self.took = self.ends.deadline.clock() - self.searched - begin
                 if reason and not (reason in ("labels", "time") and self._search_on()):
-                    return reason
+                    return self.ends.reason() or reason
         except MemoryError:
             return "memory"
 

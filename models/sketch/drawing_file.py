@@ -42,8 +42,6 @@ _UNLABELLED: Final = {
 
 def read_file(path: Path) -> bytes:
     """Read a regular file of acceptable length, at least one byte."""
-    if path.exists() and not path.is_file():
-        raise InputError("is not a file; give a sketch as SVG, picture, .scap or .curves", file=path)
     data = read_bytes(path, MAX_BYTES, "simplify the sketch")
     if not data:
         raise InputError("is empty; save the sketch again", file=path)

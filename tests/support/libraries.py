@@ -4,6 +4,7 @@ from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.contributions.points import add_points
 from crossfield.export.library.documents.documents import read_library
 from crossfield.export.library.plan.spec import read_spec
+from crossfield.models.written_files import LIST
 
 HEAD = 'format = "crossfield-library-spec"\nversion = 1\ntitle = "a library for tests"\n'
 OPEN = """formulations = ["milp", "bilin1", "miqp", "exact", "cubic", "qp"]
@@ -39,5 +40,5 @@ def improve(library, points):
 
 
 def content(folder):
-    """All files of a folder, hidden ones too."""
-    return {path.name: path.read_bytes() for path in folder.iterdir()}
+    """All files of a folder, hidden ones too, except the list of written files."""
+    return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != LIST}

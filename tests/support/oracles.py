@@ -76,6 +76,11 @@ OTHERS = {
         "Chromium with its driver, or selenium,",
         "apt install chromium chromium-driver; pip install selenium",
     ),
+    "unshare": (
+        shutil.which("unshare") and not subprocess.run(["unshare", "-Upfr", "true"], check=False).returncode,
+        "unshare, with the right to make namespaces,",
+        "apt install util-linux; sysctl kernel.unprivileged_userns_clone=1",
+    ),
     "gzip": (shutil.which("gzip"), "gzip", "apt install gzip"),
     "distributed": (importlib.util.find_spec("distributed"), "distributed", "pip install '.[cluster]'"),
 }

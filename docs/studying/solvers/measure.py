@@ -152,7 +152,7 @@ def _proven(run: Run, watch: Watch, certificates: Path) -> Row:
     proof = cf.prove(
         make_instance(run.instance, run.turns), norm=_norm(run), limits=limits, jobs=1, stop=watch.late
     )
-    cf.write_certificate(proof, _certificate(run, certificates))
+    cf.write_certificate(proof, _certificate(run, certificates), force=True)
     facts = {"version": program_version(), "status": proof.status, "note": proof.ended}
     return facts | {"objective": proof.energy, "bound": proof.bound} | watch.row()
 

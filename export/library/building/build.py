@@ -16,8 +16,9 @@ from typing import Any
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.processes.deadline import Progress, silent
-from ....models.storage import make_folder, sha256_of, write_bytes
-from ..documents.checksums import is_intact, read_checksums
+from ....models.storage import make_folder, write_bytes
+from ....models.written_files import sha256_of
+from ..documents.checksums import claim_targets, is_intact, read_checksums
 from ..documents.documents import (
     Library,
     about_file,
@@ -34,7 +35,7 @@ from ..plan.recipe import InstancePlan, plan_library, without_skipped
 from ..plan.spec import Spec
 from .entry_files import make_entry
 from .executor import Tasks, open_tasks
-from .index import write_index
+from .index import GENERAL, write_index
 from .instance_files import make_instance_files
 from .tasks import BuildInputs, Files
 
@@ -45,19 +46,22 @@ def build(
     *,
     jobs: int = 1,
     scheduler: str | None = None,
+    force: bool = False,
     progress: Progress = silent,
 ) -> Library:
     """Build the library of a specification in a folder and return it.
 
-    scheduler: address of a dask scheduler whose workers replace the processes; progress: called with a line
-    per entry. The same specification gives the same bytes with any number of processes, and with points on
-    every processor. Raises InputError, OutputError, BuildError.
+    scheduler: address of a dask scheduler whose workers replace the processes; force: whether to replace
+    files of the user; progress: called with a line per entry. The same specification gives the same bytes
+    with any number of processes, and with points on every processor. Raises InputError; OutputError, before
+    any work for files of the user that are in the way; BuildError.
     """
-    plan_library(spec)  # raises before there is a folder
+    plans = plan_library(spec)  # raises before there is a folder
     folder, is_new = Path(folder), not Path(folder).exists()
     make_folder(folder)
     try:
         with library_lock(folder, "a build of the library", progress):
+            _claim_targets(folder, plans, force=force)
             points = read_points(spec.points) if spec.points else NO_POINTS
             ledger = read_ledger(spec.ledger.parent, spec.ledger.name) if spec.ledger else Ledger(folder)
             return build_locked(
@@ -75,6 +79,7 @@ def rebuild(folder: str | Path, *, jobs: int = 1, progress: Progress = silent) -
     folder = read_library(folder).folder
     with library_lock(folder, "a build of the library", progress):
         spec, ledger = read_library(folder).spec, read_ledger(folder)
+        _claim_targets(folder, plan_library(spec))
         return build_locked(spec, folder, ledger, given_points_of(folder), jobs=jobs, progress=progress)
 
 
@@ -110,6 +115,14 @@ def build_locked(
         folder, spec, complete, dict(sorted(work.skipped.items())), failed=work.failed, earlier=work.sums
     )
     return replace(read_library(folder), failed=work.failed)
+
+
+def _claim_targets(folder: Path, plans: Iterable[InstancePlan], *, force: bool = False) -> None:
+    """Raise OutputError for files of the user that are in the way of a build, unless it is forced."""
+    stems = {entry.name for planned in plans for entry in planned.entries}
+    for planned in plans:
+        stems |= {planned.recipe.name, f"cf_{planned.recipe.sketch.name}"}
+    claim_targets(folder, stems, GENERAL, force=force)
 
 
 def has_unbuilt_records(library: Library) -> bool:

@@ -12,12 +12,13 @@ from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.proof import check_certificate, check_orthogonal
 from ....models.storage import read_bytes, write_bytes
+from ....models.written_files import is_unchanged
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, program_version
 from ...pictures.web import field_picture
 from ...writing.records import number_text
 from ..documents import check_point
-from ..documents.checksums import is_intact, write_checksums
+from ..documents.checksums import SUMS, write_checksums
 from ..documents.citation import PAPER, REFERENCES, licence_terms, release_facts
 from ..documents.documents import (
     INDEX,
@@ -37,6 +38,20 @@ from .table import TABLE, instance_name, table
 CHECKER: Final = "check_point.py"
 SOLU: Final = "library.solu"
 TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "index.html")
+
+GENERAL: Final = frozenset(
+    {
+        *TEXTS,
+        CHECKER,
+        SOLU,
+        TABLE,
+        INDEX,
+        LEDGER,
+        SUMS,
+        *(f"{name}.py" for name in ("check_certificate", "check_orthogonal")),
+    }
+)
+"""Names of the files about a library as a whole, but for pictures and drawings."""
 
 _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 
@@ -67,7 +82,7 @@ def write_index(
     for sidecar in sidecars:
         present |= {f"{sidecar['name']}.json", *files_of_entry(sidecar)}
     for name in earlier.keys() - present:  # files that were added by hand stay, and those of what failed
-        if _OURS.fullmatch(name) and is_intact(folder, name, earlier) and not name.startswith(tuple(failed)):
+        if _OURS.fullmatch(name) and is_unchanged(folder / name) and not name.startswith(tuple(failed)):
             (folder / name).unlink()
     write_checksums(folder, present)
 

@@ -240,15 +240,21 @@ def entry(name: str) -> LibraryEntry:
 
 
 def write_entries(
-    folder: str | Path, chosen: Sequence[LibraryEntry], *, progress: Progress = silent
+    folder: str | Path,
+    chosen: Sequence[LibraryEntry],
+    *,
+    force: bool = False,
+    progress: Progress = silent,
 ) -> dict[str, list[str]]:
     """Write the files of entries as a build does, with manifests and instances that read answers back.
 
-    Returns the names of the files by entry. Raises OutputError.
+    force: whether to replace files of the user. Returns the names of the files by entry. Raises OutputError.
     """
     from ....models.storage import make_folder
+    from ..documents.checksums import claim_targets
 
     target, written = make_folder(folder), {}
+    claim_targets(target, {name for one in chosen for name in (one.name, one.facts["instance"])}, force=force)
     for number, one in enumerate(chosen, 1):
         progress(f"{number} of {len(chosen)} entries: {one.name}")
         written[one.name] = one.write_set(target)

@@ -19,6 +19,7 @@ from ....models.input_limits import MAX_SOLUTION
 from ....models.packed import unpack
 from ....models.processes.deadline import Progress, silent
 from ....models.storage import read_bytes
+from ....models.written_files import LIST
 from ...formats.registry import program_version
 from ..documents.check_point import BadInputError, check
 from ..documents.checksums import SUMS, is_intact, read_checksums
@@ -76,7 +77,7 @@ def _file_names(folder: Path) -> set[str]:
     return {
         path.name
         for path in folder.iterdir()
-        if path.is_file() and not path.is_symlink() and path.suffix != ".part"
+        if path.is_file() and not path.is_symlink() and path.suffix != ".part" and path.name != LIST
     }
 
 
@@ -102,7 +103,7 @@ def _find_damaged_files(folder: Path) -> Iterator[Defect]:
         if name not in present:
             yield Defect(name, "is missing", _FETCH)
         elif not is_intact(folder, name, sums):
-            remedy = _INTERRUPTED if name == LEDGER else _FETCH
+            remedy = _INTERRUPTED if name == LEDGER else f"{_FETCH} with --force"
             yield Defect(name, "has another SHA-256 than SHA256SUMS states", remedy)
     of_ledger: list[str] = []
     with suppress(CrossfieldError):  # a damaged ledger is found by the build

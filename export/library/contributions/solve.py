@@ -28,10 +28,11 @@ from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, choose_format
 from ...statuses import Status
 from ..building.build import has_unbuilt_records, rebuild
+from ..documents.checksums import claim_targets
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import library_lock
 from ..ledger.grades import is_better
-from ..ledger.ledger import Record, RunStatus, add_record, read_ledger
+from ..ledger.ledger import LEDGER, Record, RunStatus, add_record, read_ledger
 from ..ledger.points import clipped_field, complete_point
 from ..plan.spec import RUNGS
 
@@ -63,6 +64,8 @@ def solve_library(
     chosen = dict.fromkeys(solvers or [name for name, solver in SOLVERS.items() if not solver.missing])
     Record("cf_none", "0" * 64, "none", "0", "no point", by=by, machine=machine).check()
     library, records = read_library(folder), []
+    read_ledger(library.folder)  # a damaged one is reported as such
+    claim_targets(library.folder, (), (LEDGER,))
     if has_unbuilt_records(library):
         library = rebuild(library.folder, progress=progress)
     try:

@@ -19,6 +19,7 @@ from crossfield.models.errors import (
 )
 from crossfield.models.formulations.problem import with_integers_fixed, with_products_lifted
 from crossfield.models.instance.file import read_instance, write_instance
+from folders import contents
 from loops import for_each
 
 OPTIONS = [
@@ -190,7 +191,7 @@ def test_problems_that_no_manifest_records_are_refused(tmp_path):
     fixed = with_integers_fixed(problem, make_field(problem.instance))
     with pytest.raises(UnsupportedByFormatError, match="write nl, lp or mps"):
         write(fixed, tmp_path / "fixed.mod")
-    assert [path.name for path in tmp_path.iterdir()] == ["single.lp"]
+    assert list(contents(tmp_path)) == ["single.lp"]
     write(fixed, tmp_path / "fixed.gms")
 
 
@@ -211,7 +212,7 @@ def test_a_start_is_in_the_file_or_refused(tmp_path, name):
     assert list(tmp_path.iterdir()) == []
     manifest = write_problem(problem, tmp_path, formats=[name], start=field)
     assert manifest.document["refused"] == {}
-    assert list(tmp_path.glob("*.gurobi.mst"))
+    assert list(tmp_path.glob("*.gurobi.start.mst"))
 
 
 def test_formats_that_hold_nothing_of_what_was_asked_are_refused_before_a_file(tmp_path):

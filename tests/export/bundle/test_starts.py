@@ -149,7 +149,7 @@ def test_starts_are_written_for_the_solvers_that_take_them(tmp_path: Path):
     assert written["miqcp-bilinear"] == {"gurobi", "scip"}
     assert written["miqp-exact"] == set(STARTS) - {"highs"}
     assert written["minlp-parity"] == {"scip"}
-    assert (tmp_path / "tiny.milp-mccormick.gurobi.mst").is_file()
+    assert (tmp_path / "tiny.milp-mccormick.gurobi.start.mst").is_file()
     fixed = formulate(instance, "qp-fixed", p=field.p)
     assert write_starts(fixed, field, tmp_path, "tiny.qp-fixed") == {}
 

@@ -123,7 +123,7 @@ REFUSED = [
     ("run mouse --mask black.png", "", "leave --mask out"),
     ("run tiny.json --size 30", "", "leave --size and --mask out"),
     ("run missing.svg", "", "crossfield list"),
-    ("run .", "", "is not a file"),
+    ("run .", "", "is a directory"),
     ("draw field.npz -o out.png", "", "no such file"),
     ("export tiny.json -f milp-mccormick -f milp-mcormick", "", re.escape(NO_SUCH_FORMULATION)),
     ("export tiny.json -F nl -F xyz", "", "there is no format 'xyz'; choose one of nl, gms, lp, mps"),

@@ -21,6 +21,7 @@ from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.methods import METHODS
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.sketch.samples import SAMPLES
+from folders import contents
 from loops import for_each
 from PIL import Image, ImageDraw
 
@@ -69,7 +70,7 @@ def test_each_command_reads_the_files_of_the_one_before(tmp_path, crossfield):
     crossfield("export skew.json -f milp-mccormick -o files")
     stem = "skew.milp-mccormick"
     suffixes = (".nl", ".row", ".col", ".gms", ".lp", ".mps", ".manifest.json")
-    names = {path.name for path in Path("files").iterdir()}
+    names = set(contents(Path("files")))
     assert names == {"skew.instance.json", *(stem + suffix for suffix in suffixes)}
 
     facts = json.loads(crossfield("solve skew.json -f milp-mccormick --time-limit 5 --json -o solved"))
@@ -130,8 +131,8 @@ def test_a_run_writes_all_files_and_reports_separate_parts(two_parts):
     proven = {"certificate.npz"} if report["proof"] else set()  # the time may not suffice on a busy machine
     shaded = {report["surface"]["picture"]} - {None}
     assert bool(shaded) == (not report["surface"]["doubts"])
-    assert {path.name for path in folder.iterdir() if path.is_file()} == RUN_FILES | proven | shaded
-    models = {path.name for path in (folder / "models").iterdir()}
+    assert {name for name in contents(folder) if "/" not in name} == RUN_FILES | proven | shaded
+    models = set(contents(folder / "models"))
     assert {name.split(".")[1] for name in models} == {"instance", *SKEWED}
     assert report["files"] == sum(Path(name).suffix[1:] in FORMATS for name in models)
     assert not [path for path in folder.rglob("*") if path.suffix == ".part"]
@@ -171,9 +172,9 @@ def test_a_folder_with_the_name_of_a_sample_does_not_hide_it(crossfield):
 
 
 def test_options_of_the_formulation_reach_the_files(crossfield, instance_file):
-    crossfield("instance tiny.json --gauge box -o tiny.json")
+    crossfield("instance tiny.json --gauge box -o box.json")
     options = "--facet printed --stroke-norm 2 --relax --nl-form binary"
-    crossfield(f"export tiny.json -f milp-mccormick {options} --gzip -o out")
+    crossfield(f"export box.json -f milp-mccormick {options} --gzip -o out")
     document = json.loads(Path("out/tiny.milp-mccormick.manifest.json").read_text())
     assert document["options"] == {"facet": "printed", "stroke_norm": 2, "beta_norm": 1, "relax": True}
     assert document["instance"]["gauge"] == "box"

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from typing import Final
 
 import casadi
 import highspy
@@ -29,7 +30,7 @@ from crossfield.export.library.plan.instances import make_instance
 from crossfield.export.library.plan.recipe import plan_library
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.export.solutions.solution import read_solution
-from crossfield.models.errors import InputError
+from crossfield.models.errors import InputError, OutputError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.file import read_instance
@@ -37,9 +38,20 @@ from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.publication import svg_of_curves
 from crossfield.models.sketch.samples import sample, sample_svg
 from crossfield.models.sketch.svg import read_svg
-from libraries import HEAD, content, spec_of
+from crossfield.models.written_files import LIST
+from libraries import HEAD, content, library_of, spec_of
 from loops import for_each
 
+SMALL: Final = """formulations = ["qp", "exact"]
+[rungs.tiny]
+sizes = [3]
+formats = ["mps"]
+[[sketches]]
+name = "rand"
+random = "full"
+seeds = [1]
+points = "greedy"
+"""
 SCHEMAS = places.ROOT / "export" / "library" / "documents"
 
 SPEC = (
@@ -390,7 +402,9 @@ def test_only_missing_or_damaged_files_are_made_again(built, spec, copy):
     download = copy / ".cf_own_n004_qp.json.abc.part"  # of a browser
     download.write_bytes(b"half")
     messages = []
-    build(read_spec(spec), copy, progress=messages.append)
+    with pytest.raises(OutputError, match=r"have changed since they were written: .*--force"):
+        build(read_spec(spec), copy)
+    build(read_spec(spec), copy, force=True, progress=messages.append)
     assert sorted(line.split(": ")[1] for line in messages[:-1]) == [
         "cf_own_n004_box_parity",
         "cf_own_n004_milp",
@@ -399,33 +413,75 @@ def test_only_missing_or_damaged_files_are_made_again(built, spec, copy):
     assert content(copy) == {**content(built.folder), download.name: b"half"}
 
 
+USERS: Final = {
+    name: f"{name} of the user".encode()
+    for name in (
+        "README.md",
+        "LICENSE",
+        "CHANGELOG.md",
+        "index.html",
+        "cf_rand_n003_s1.field.json",
+        "SHA256SUMS",
+    )
+}
+
+
+def test_files_of_the_user_stop_a_build_before_any_work_unless_it_is_forced(tmp_path, capsys):
+    """A lock and an unfinished download are in nobody's way, and stay either way."""
+    others = {".lock": b"", "film.mkv.part": b"half", "cf_other_n003.json": b"{}"}
+    spec_of(tmp_path, SMALL)
+    (tmp_path / "lib").mkdir()
+    for name, data in (USERS | others).items():
+        (tmp_path / "lib" / name).write_bytes(data)
+    command = ["library", "build", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "lib")]
+    assert invoke(command) == 1
+    said = capsys.readouterr().err
+    assert "has files that are not crossfield's, or have changed since they were written: " in said
+    assert sum(name in said for name in USERS) >= 5
+    assert "--force" in said
+    assert content(tmp_path / "lib") == USERS | others
+
+    assert invoke([*command, "--force"]) == 0
+    whole = content(build(read_spec(tmp_path / "spec.toml"), tmp_path / "new").folder)
+    assert content(tmp_path / "lib") == whole | others
+
+
+def test_a_file_that_the_user_changed_stops_the_next_build(tmp_path):
+    library = library_of(tmp_path, SMALL).folder
+    notes = library / "README.md"
+    notes.write_text("my notes")
+    before = content(library)
+    with pytest.raises(OutputError, match=r"README\.md: is not crossfield's, or has changed"):
+        build(read_spec(tmp_path / "spec.toml"), library)
+    assert content(library) == before
+    build(read_spec(tmp_path / "spec.toml"), library, force=True)
+    assert notes.read_text() != "my notes"
+
+
+def test_a_library_that_was_copied_without_its_list_is_one_still(tmp_path):
+    """A release holds no hidden files; its checksums tell which files are its own."""
+    library = library_of(tmp_path, SMALL).folder
+    (tmp_path / "copy").mkdir()
+    for name, data in content(library).items():
+        (tmp_path / "copy" / name).write_bytes(data)
+    smaller = replace(read_spec(tmp_path / "spec.toml"), formulations=("qp-fixed",))
+    build(smaller, tmp_path / "copy")
+    assert content(tmp_path / "copy") == content(build(smaller, tmp_path / "alone").folder)
+
+
 def test_an_instance_that_fails_is_reported_and_the_others_are_built(tmp_path, capsys):
     """A drawing without strokes next to a random sketch, in a new folder and again."""
     (tmp_path / "bare.scap").write_text("#9 9\n")
-    spec = """formulations = ["qp"]
-[rungs.tiny]
-sizes = [4]
-formats = ["mps"]
-[[sketches]]
-name = "bare"
-file = "bare.scap"
-points = "greedy"
-[[sketches]]
-name = "rand"
-random = "full"
-seeds = [1]
-points = "greedy"
-"""
-    spec_of(tmp_path, spec)
+    spec_of(tmp_path, f'{SMALL}[[sketches]]\nname = "bare"\nfile = "bare.scap"\n')
     command = ["library", "build", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "lib"), "--quiet"]
     for _ in range(2):
         assert invoke(command) == 1
-        assert "cf_bare_n004 failed: " in capsys.readouterr().err
+        assert "cf_bare_n003 failed: " in capsys.readouterr().err
     library = read_library(tmp_path / "lib")
-    assert library.document["entries"] == ["cf_rand_n004_s1_qp"]
-    assert "holds no stroke" in library.skipped["cf_bare_n004"]
-    assert "cf_bare_n004: " in (tmp_path / "lib" / "README.md").read_text()
-    assert [defect.file for defect in verify_library(tmp_path / "lib")] == ["cf_bare_n004"]
+    assert library.document["entries"] == ["cf_rand_n003_s1_qp", "cf_rand_n003_s1_exact"]
+    assert "holds no stroke" in library.skipped["cf_bare_n003"]
+    assert "cf_bare_n003: " in (tmp_path / "lib" / "README.md").read_text()
+    assert [defect.file for defect in verify_library(tmp_path / "lib")] == ["cf_bare_n003"]
 
 
 def test_a_build_that_is_refused_leaves_nothing(tmp_path):
@@ -505,7 +561,7 @@ def test_an_interrupted_build_ends_soon_with_one_line_and_whole_files(begun, bui
     assert error == "crossfield: interrupted; all written files are complete\n"
     whole = content(built.folder)
     assert all(whole[name] == data for name, data in content(out).items())
-    assert not list(out.glob(".*"))
+    assert [path.name for path in out.glob(".*")] == [LIST]
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from crossfield.export.library.plan.recipe import plan_library
 from crossfield.export.library.plan.spec import default_spec
 from crossfield.models.errors import InputError
 from crossfield.models.instance.file import instance_to_json
+from folders import contents
 from loops import for_each
 
 REMEDY = "build `default` and copy its entries.csv to export/library/plan/entries.csv"
@@ -85,9 +86,7 @@ def test_model_files_have_the_bytes_of_a_build(built, tmp_path):
     chosen = [cf.entry(name) for name in built.document["entries"]]
     written = write_entries(tmp_path, chosen)
     assert written == {entry["name"]: set_of(entry) for entry in built.entries}
-    assert {path.name for path in tmp_path.iterdir()} == {
-        name for names in written.values() for name in names
-    }
+    assert set(contents(tmp_path)) == {name for names in written.values() for name in names}
     for name in {name for entry in built.entries for name in models_of(entry)}:
         assert (tmp_path / name).read_bytes() == (built.folder / name).read_bytes()
 
@@ -149,14 +148,24 @@ def test_an_unknown_entry_suggests_near_names(name, near):
 # The command
 
 
+def test_files_of_the_user_are_not_replaced_by_those_of_an_entry(tmp_path, capsys):
+    mine = tmp_path / "cf_cyl_n005.instance.json"
+    mine.write_text("mine")
+    command = ["library", "get", "cf_cyl_n005_exact", "-o", str(tmp_path), "--quiet"]
+    assert invoke(command) == 1
+    assert "cf_cyl_n005.instance.json: is not crossfield's, or has changed" in capsys.readouterr().err
+    assert contents(tmp_path) == {mine.name: b"mine"}
+    assert invoke([*command, "--force"]) == 0
+    assert mine.read_text() != "mine"
+    assert invoke(command) == 0
+
+
 def test_the_command_writes_the_files_of_the_selected_entries(built, tmp_path, capsys):
     names = ["cf_cyl_n005_exact", "cf_cyl_n005_milp"]
     assert invoke(["library", "get", *names, "--rung", "tiny", "-o", str(tmp_path), "--json"]) == 0
     written = {name: set_of(built.entry(name)) for name in names}
     assert json.loads(capsys.readouterr().out) == written
-    assert {path.name for path in tmp_path.iterdir()} == {
-        file for files in written.values() for file in files
-    }
+    assert set(contents(tmp_path)) == {file for files in written.values() for file in files}
 
 
 @pytest.mark.needs("highs")

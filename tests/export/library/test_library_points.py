@@ -148,11 +148,8 @@ def test_a_better_point_keeps_given_points_and_another_build_gives_the_same(sear
     improved, _ = improve(library, tmp_path / "sent")
     assert f"{SADDLE}_exact" in improved[f"{SADDLE}_exact.sol"]
     assert verify_library(library) == []
-    other = tmp_path / "other"
-    other.mkdir()
-    for path in (library / "ledger.json", *library.glob("cf_*_exact.field.json")):
-        shutil.copy(path, other)
-    assert content(build(spec, other).folder) == content(library)
+    again = spec_of(tmp_path, 'points = "known"\nledger = "lib/ledger.json"\n' + SPEC)
+    assert content(build(again, tmp_path / "other").folder) == content(library)
 
 
 @pytest.mark.slow

@@ -5,6 +5,7 @@ from dataclasses import replace
 from itertools import combinations
 
 import pytest
+from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.library_command import solve_command
 from crossfield.export.library.building.build import rebuild
@@ -22,7 +23,8 @@ from crossfield.export.library.ledger.grades import (
 )
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.solvers_table import SOLVERS
-from crossfield.models.errors import CrossfieldError
+from crossfield.models.errors import CrossfieldError, OutputError
+from crossfield.models.written_files import LIST
 from libraries import OPEN, library_of
 
 MILP, BILINEAR = "cf_rand_n004_s6_milp", "cf_rand_n004_s6_bilin1"
@@ -190,6 +192,17 @@ def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others
     assert {(record.status, record.seconds) for record in records} == {("no point", None)}
 
 
+def test_a_release_without_hidden_files_is_solved_unless_its_ledger_was_changed(copy):
+    (copy / LIST).unlink()
+    records = solve_library(copy, solvers=["highs"], time_limit=250.0)
+    assert [record["status"] for record in records] == ["optimal", "optimal"]
+    assert verify_library(copy) == []
+    ledger = copy / "ledger.json"
+    ledger.write_text(ledger.read_text().replace('"threads": 1', '"threads": 2'))
+    with pytest.raises(OutputError, match=r"ledger\.json: is not crossfield's, or has changed"):
+        solve_library(copy, solvers=["highs"])
+
+
 def interrupting(lines):
     """A progress that presses Ctrl-C at the first line that contains one of these texts, and forgets it."""
     left = list(lines)
@@ -248,6 +261,6 @@ def test_unknown_names_damaged_ledgers_and_folders_without_a_library_are_one_lin
             (copy / "ledger.json").write_text(arguments)
         command = ["solve", copy, "--quiet"] if isinstance(arguments, str) else arguments
         assert invoke(["library", *map(str, command)]) == 1
-        shown = capfd.readouterr().err
+        shown = complaints(capfd.readouterr().err)
         assert len(shown.splitlines()) == 1
         assert words in shown

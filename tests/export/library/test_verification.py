@@ -9,7 +9,7 @@ import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
-from crossfield.export.library.building.build import rebuild
+from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.documents.documents import read_library
 from crossfield.export.library.ledger.ledger import Record, add_record
@@ -249,7 +249,7 @@ def test_defects_are_one_line_each_and_the_exit_code_is_1(lib, capsys):
     assert complaints(capsys.readouterr().err).splitlines() == [
         (
             "crossfield: README.md: has another SHA-256 than SHA256SUMS states; fetch it again, "
-            "or build the library again"
+            "or build the library again with --force"
         ),
         "crossfield: notes.txt: is not in SHA256SUMS; remove it, or build the library again",
     ]
@@ -263,7 +263,7 @@ def test_the_remedy_of_a_defect_removes_it(lib):
     seal(lib)
     (lib / f"{STEM}_milp.sol").write_text("half")
     (lib / f"{STEM}_milp.col").unlink()
-    rebuild(lib)
+    build(read_library(lib).spec, lib, force=True)
     assert verify_library(lib) == []
 
 

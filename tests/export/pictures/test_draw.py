@@ -8,6 +8,7 @@ from crossfield.export.pictures.draw import KINDS, draw
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField, field_in_windows
 from crossfield.models.instance.instance import Instance
+from folders import contents
 from loops import for_each
 from PIL import Image
 
@@ -68,7 +69,7 @@ def test_every_kind_and_suffix_is_written_the_same_twice(tmp_path, kind, suffix)
         {"lines.linewidth": 9.0, "svg.hashsalt": "other", "font.size": 30.0, "savefig.bbox": "tight"}
     ):
         assert draw(field, tmp_path / f"second{suffix}", kind=kind).read_bytes() == data
-    assert sorted(path.name for path in tmp_path.iterdir()) == [f"first{suffix}", f"second{suffix}"]
+    assert list(contents(tmp_path)) == [f"first{suffix}", f"second{suffix}"]
 
 
 def test_row_0_is_at_the_top_and_strokes_lie_where_they_are(tmp_path):

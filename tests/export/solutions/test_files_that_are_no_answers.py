@@ -65,7 +65,7 @@ def test_a_model_is_no_answer(written):
 
 def test_starts_that_crossfield_writes_are_called_starts(written):
     for solver in ("gurobi", "cplex"):
-        (path,) = written.glob(f"*.{solver}.mst")
+        (path,) = written.glob(f"*.{solver}.start.mst")
         assert "this is a MIP start (.mst)" in refusal(path)
 
 
@@ -84,7 +84,7 @@ def test_parameters_of_gurobi_are_named_as_such(tmp_path):
 
 
 def test_starts_in_a_layout_of_answers_are_read(written):
-    for pattern in ("*.highs.sol", "*.scip.sol", "*.xpress.slx"):
+    for pattern in ("*.highs.start.sol", "*.scip.start.sol", "*.xpress.start.slx"):
         (path,) = written.glob(pattern)
         assert read_raw(path).has_point
 

@@ -11,6 +11,7 @@ import crossfield as cf
 import pytest
 from children import complaints
 from crossfield.models.proof.certificate import read_certificate
+from crossfield.models.written_files import LIST
 from PIL import Image
 
 RUN = """
@@ -40,7 +41,7 @@ def earlier(tmp_path_factory):
 
 
 def files(folder):
-    paths = [path for path in folder.iterdir() if path.is_file()]
+    paths = [path for path in folder.iterdir() if path.is_file() and path.name != LIST]
     return {path.name: path.read_bytes() for path in paths}
 
 
@@ -105,32 +106,39 @@ def test_a_run_that_is_killed_while_it_draws_leaves_earlier_files(earlier, tmp_p
     new = files(folder)
     assert all(new[name] == old[name] for name in (*PICTURES, "index.html", "report.json"))
     cf.run(cf.sample("skew", 6), folder, limits=cf.Limits(0.5), stop=lambda: True)
-    assert list(folder.rglob(".*")) == []
+    assert [path for path in folder.rglob(".*") if path.name != LIST] == []
 
 
 @pytest.mark.slow
-def test_ctrl_c_while_it_draws_leaves_no_picture_of_the_earlier_run(earlier, tmp_path):
+def test_ctrl_c_while_it_draws_leaves_all_files_of_the_earlier_run(earlier, tmp_path):
     source, old = earlier
     folder = shutil.copytree(source, tmp_path / "run")
     assert end_at(folder, "drawing field", signal.SIGINT, seconds="0.5", threads="1") == (0, "")
-    new = files(folder)
+    assert files(folder) == old
+    new = files(folder / "new-results")
     assert json.loads(new["report.json"])["interrupted"] == "drawing"
     drawn = [name for name in PICTURES if name in new]
     assert drawn[0] == "overview.png"
     assert len(drawn) < len(PICTURES)
-    assert all(new[name] != old.get(name) for name in drawn)
-    assert_whole(folder, old)
+    assert_whole(folder / "new-results", old)
 
 
-def test_a_failing_certificate_leaves_field_and_report(tmp_path, capsys):
+@pytest.mark.slow
+def test_an_interrupted_run_of_the_same_field_keeps_the_pictures_of_the_earlier_one(earlier, tmp_path):
+    source, old = earlier
+    folder = shutil.copytree(source, tmp_path / "run")
+    report = cf.run(cf.sample("skew", 6), folder, limits=cf.Limits(0.5), stop=lambda: True)
+    assert report.interrupted
+    assert report.folder == folder
+    changed = {"report.json", "index.html"}
+    assert {**files(folder), **dict.fromkeys(changed)} == {**old, **dict.fromkeys(changed)}
+    assert {name for name in PICTURES if name.encode() in files(folder)["index.html"]} == {*PICTURES}
+
+
+def test_a_folder_in_the_place_of_a_file_stops_a_command_before_its_work(tmp_path, capsys):
     from crossfield.export.cli.app import invoke
 
     (tmp_path / "mouse.proof.certificate.npz").mkdir()
     assert invoke(["prove", "mouse", "--size", "4", "-o", str(tmp_path), "--time-limit", "60", "-q"]) == 1
-    err = capsys.readouterr().err
-    assert "mouse.proof.certificate.npz: cannot be written" in err
-    assert "time" not in err
-    report = json.loads((tmp_path / "mouse.proof.json").read_text())
-    assert (report["status"], report["bound"], report["ended"]) == ("unproven", 0.0, "optimal")
-    assert "cannot be written" in report["reason"]
-    assert cf.read_field(tmp_path / "mouse.proof.field.npz").energy().total == report["energy"]
+    assert "mouse.proof.certificate.npz: is a folder; choose another folder" in capsys.readouterr().err
+    assert files(tmp_path) == {}

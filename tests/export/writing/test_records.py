@@ -30,6 +30,7 @@ from crossfield.export.writing.records import (
 )
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.instance.instance import Instance
+from folders import contents
 from hypothesis import given
 from hypothesis import strategies as st
 from loops import for_each
@@ -233,7 +234,7 @@ def test_extreme_weights_are_refused_and_what_was_there_stays(name, weights, suf
     problem = make_problem(name, make_instance(**weights))
     with pytest.raises(UnsupportedByFormatError, match=r"has the coefficient \d.*(stroke|skew) weight"):
         write(problem, tmp_path / f"x.{suffix}", dialect=dialect)
-    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+    assert contents(tmp_path) == before
 
 
 def test_a_small_weight_that_is_added_to_others_is_no_coefficient(tmp_path):

@@ -245,8 +245,8 @@ def test_mutated_files_give_named_errors(on_either, tmp_path, suffix, data):
         (write_instance, read_instance, on_either.instance),
         (write_field, read_field, on_either),
     ):
-        path = write(thing, tmp_path / f"mutated.{suffix}")
-        content = bytearray(path.read_bytes())
+        content = bytearray(write(thing, tmp_path / f"whole.{suffix}").read_bytes())
+        path = tmp_path / f"mutated.{suffix}"
         for _ in range(data.draw(st.integers(1, 4))):
             at = data.draw(st.integers(0, len(content) - 1))
             content[at : at + data.draw(st.integers(0, 8))] = data.draw(st.binary(max_size=8))

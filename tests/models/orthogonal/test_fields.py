@@ -295,3 +295,12 @@ def test_a_search_reports_the_energies_of_fields(shape, gauge, orthogonal):
     assert energies[-1] == pytest.approx(result.field.energy().total, rel=1e-8)
     assert energies[0] <= cf.greedy_field(instance).energy().total + 1e-9
     assert energies == sorted(energies, reverse=True)
+
+
+def test_many_triangles_apart_are_searched():
+    """So many that patches are explored, and without a pair or a stroke there is none."""
+    flat = np.column_stack(
+        [np.tile([0.0, 1, 0], 6001), np.tile([0.0, 0, 1], 6001), np.repeat(np.arange(6001.0), 3)]
+    )
+    instance = on_edges(mesh_of(flat, np.arange(18003).reshape(-1, 3)), sharp=9, boundary=False)
+    assert cf.search(instance, rounds=1).field.energy().total == 0

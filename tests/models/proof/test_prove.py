@@ -18,7 +18,10 @@ from crossfield.export.cli.app import invoke
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.symmetries import mirrored, transposed, turned
+from crossfield.models.processes.deadline import Deadline
+from crossfield.models.proof import check_certificate, orthogonal
 from exhaustive import exact, optimum, random_instance, sketch
+from small_drawings import read, svg
 
 pytestmark = pytest.mark.numeric
 
@@ -137,6 +140,63 @@ def test_a_check_without_memory_gives_its_reason_and_is_not_repeated(tmp_path):
     assert counts == "1 0.0 0 True"
     assert "the check of its levels takes more memory than there is" in error
     assert not (tmp_path / "it.npz").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("room", [1 << 20, 1 << 22])
+def test_a_proof_ends_at_the_last_level_that_its_checker_takes(room, monkeypatch, tmp_path):
+    # with so little skew weight, levels get ever longer ranges; the room is less than usual, to save time
+    circles = "".join(f'<circle cx="{x}" cy="50" r="15" fill="none" stroke="black"/>' for x in (30, 70))
+    instance = read(svg(circles), size=9).with_weights(stroke_weight=1, skew_weight=1e-6)
+    monkeypatch.setattr(check_certificate, "ROOM", room)
+    proof = cf.prove(instance, jobs=1)
+    assert (proof.ended, proof.reason) == ("labels", "")
+    assert 0 < proof.bound < proof.energy
+    cf.write_certificate(proof, tmp_path / "it.npz")
+    assert cf.read_certificate(tmp_path / "it.npz", on=instance).bound == proof.bound
+
+
+@pytest.mark.slow
+def test_a_mesh_whose_levels_do_not_fit_has_the_field_of_its_search_and_the_reason(tmp_path):
+    program = """if True:
+        import resource
+        import numpy as np
+        import crossfield as cf
+        from crossfield.models.instance.instance import Instance
+        from crossfield.models.mesh.shapes import torus
+
+        resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
+        mesh = torus(150, 150)
+        at = np.arange(0, mesh.size, 50)
+        instance = Instance.on_faces("torus", mesh, at, np.linspace(0, 3, len(at)), np.ones(len(at)))
+        lines = []
+        proof = cf.prove(instance, stop=lambda: len(lines) > 2, progress=lines.append)
+        print(proof.ended, len(proof.levels), proof.energy <= cf.greedy_field(instance).energy().total)
+        try:
+            cf.write_certificate(proof, "it.npz")
+        except cf.CrossfieldError as error:
+            print(error)
+    """
+    command = [sys.executable, "-c", program]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    counts, error = result.stdout.splitlines()
+    assert counts == "interrupted 0 True"
+    assert "the coarsest level has 17280000 pairs of labels" in error
+
+
+def test_the_time_that_no_level_uses_goes_to_the_search(monkeypatch):
+    # every line of progress is a tick of the clock: a round of the search
+    monkeypatch.setattr(orthogonal, "_MOST_COSTS", 1000)
+    instance, results = cf.sample("half_torus"), []
+    for find in (cf.search, cf.prove):
+        lines = []
+        limits = cf.Limits(6.0, gap=0.0).until(Deadline(6.0, lambda lines=lines: float(len(lines))))
+        results.append(find(instance, limits=limits, progress=lines.append, jobs=1))
+    found, proof = results
+    assert found.energies[0][1] > found.field.energy().total + 0.01
+    assert proof.energy == pytest.approx(found.field.energy().total, rel=1e-9)
+    assert (proof.ended, proof.levels) == ("time", ())
+    assert proof.reason.startswith("the coarsest level has")
 
 
 def test_turned_and_mirrored_sketches_have_the_same_proven_optimum():

@@ -106,3 +106,11 @@ def test_the_polyvector_field_of_right_angles_is_the_power_field(gauge):
     assert not polyvector.beta.any()
     assert np.array_equal(polyvector.p, power.p)
     assert polyvector.alpha == pytest.approx(power.alpha, abs=1e-7)
+
+
+@pytest.mark.parametrize("method", ["greedy", "search"])
+def test_a_stroke_too_light_for_the_digits_of_a_system_is_no_error(method):
+    instance = Instance.on_pixels(
+        "light", np.ones((3, 3), bool), [[0, 0]], [0.3], [1e-12], stroke_coefficient=1e-9, orthogonal=True
+    )
+    assert METHODS[method](instance).energy().total <= 1e-21 * 0.3**2 * (1 + 1e-3)

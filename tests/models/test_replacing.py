@@ -1,0 +1,236 @@
+"""Only files that crossfield wrote and nobody changed are replaced or removed, all together at the end."""
+
+import os
+import subprocess
+import sys
+from itertools import count
+
+import pytest
+from crossfield.models import storage
+from crossfield.models.errors import InputError, OutputError
+from crossfield.models.storage import remove_unfinished, replace_results, replacing, write_bytes
+from crossfield.models.written_files import LIST, is_unchanged
+from folders import contents, interrupt_call
+
+pytestmark = pytest.mark.smoke
+
+
+def write_results(folder, files, planned=None, **options):
+    """Write files by name into a folder, together."""
+    with replace_results(folder, files if planned is None else planned, **options) as new:
+        for name, data in files.items():
+            path = new.path / name
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(data)
+
+
+def test_what_crossfield_wrote_is_replaced(tmp_path):
+    for data in (b"first", b"second", b"first"):
+        write_bytes(tmp_path / "a.json", data)
+        write_results(tmp_path, {"b.json": data, "sub/c.json": data})
+        assert contents(tmp_path) == {"a.json": data, "b.json": data, "sub/c.json": data}
+
+
+@pytest.mark.parametrize("name", ["a.json", "sub/a.json", "line\nend", "back\\slash", "ä", "\udcff"])
+def test_files_of_the_user_stay_unless_forced(tmp_path, name):
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes(b"user's")
+    for write in (
+        lambda **options: write_bytes(path, b"new", **options),
+        lambda **options: write_results(tmp_path, {name: b"new", "other": b"new"}, **options),
+    ):
+        path.write_bytes(b"user's")
+        with pytest.raises(OutputError, match="--force"):
+            write()
+        assert contents(tmp_path).get(name) == b"user's"
+        assert "other" not in contents(tmp_path)
+        write(force=True)
+        assert path.read_bytes() == b"new"
+        assert is_unchanged(path)
+        path.write_bytes(b"edited")
+        with pytest.raises(OutputError, match="--force"):
+            write()
+        path.write_bytes(b"new")  # as crossfield wrote it
+        write()
+
+
+def test_the_message_names_the_files_and_the_remedies(tmp_path):
+    names = [f"{number}.png" for number in range(8)]
+    for name in names:
+        (tmp_path / name).write_bytes(b"user's")
+    with pytest.raises(OutputError) as refusal:
+        write_results(tmp_path, dict.fromkeys(names, b""))
+    for word in (str(tmp_path), *names[:5], "3 more", "another folder", "--force", "force=True"):
+        assert word in str(refusal.value)
+
+
+def test_a_refusal_comes_before_the_work(tmp_path):
+    (tmp_path / "a").write_bytes(b"user's")
+    with pytest.raises(OutputError), replace_results(tmp_path, ["a"]):
+        pytest.fail("the work began")
+    with pytest.raises(OutputError), replacing(tmp_path / "a"):
+        pytest.fail("the work began")
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_a_file_that_is_read_stays_even_if_it_is_crossfields_own(tmp_path, force):
+    write_bytes(tmp_path / "a.json", b"old")
+    (tmp_path / "link.json").symlink_to("a.json")
+    for read in ("a.json", "link.json"):
+        with pytest.raises(OutputError, match="is read by the same command"):
+            write_results(tmp_path, {"a.json": b"new"}, reads=[tmp_path / read], force=force)
+    assert (tmp_path / "a.json").read_bytes() == b"old"
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_links_are_not_followed_and_folders_stay(tmp_path, force):
+    user, folder = tmp_path / "user", tmp_path / "out"
+    user.write_bytes(b"user's")
+    folder.mkdir()
+    (folder / "folder").mkdir()
+    (folder / "link").symlink_to(user)
+    with pytest.raises(OutputError, match="is a folder"):
+        write_bytes(folder / "folder", b"new", force=force)
+    if force:
+        write_bytes(folder / "link", b"new", force=True)
+    else:
+        with pytest.raises(OutputError, match="--force"):
+            write_bytes(folder / "link", b"new")
+    assert user.read_bytes() == b"user's"
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda path: path.unlink(),
+        lambda path: path.write_bytes(b""),
+        lambda path: path.write_bytes(path.read_bytes()[:-30]),
+        lambda path: path.write_bytes(b"\xff\0" * 1000),
+        lambda path: path.write_bytes(path.read_bytes().replace(b"  a", b"  ../a")),
+    ],
+)
+def test_a_damaged_list_makes_no_file_crossfields(tmp_path, damage):
+    write_bytes(tmp_path / "a", b"old")
+    damage(tmp_path / LIST)
+    with pytest.raises(OutputError, match="--force"):
+        write_bytes(tmp_path / "a", b"new")
+    assert (tmp_path / "a").read_bytes() == b"old"
+    for data in (b"1", b"2"):  # and the list goes on
+        write_bytes(tmp_path / "b", data)
+    assert (tmp_path / "b").read_bytes() == b"2"
+
+
+def test_a_list_that_is_a_link_is_not_followed(tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.write_bytes(b"user's\n")
+    (tmp_path / LIST).symlink_to(elsewhere)
+    with pytest.raises(OutputError):
+        write_bytes(tmp_path / "a", b"new")
+    assert elsewhere.read_bytes() == b"user's\n"
+    assert not (tmp_path / "a").exists()
+
+
+def test_earlier_files_that_are_no_longer_part_of_the_result_go(tmp_path):
+    planned = ["a", "b", "c", "d"]
+    write_results(tmp_path, {"a": b"1", "b": b"1", "c": b"1"}, planned)
+    (tmp_path / "other").write_bytes(b"user's")
+    with replace_results(tmp_path, planned) as new:
+        (new.path / "a").write_bytes(b"2")
+        (new.path / "c").write_bytes(b"2")
+        new.kept.add("c")
+    assert contents(tmp_path) == {"a": b"2", "c": b"1", "other": b"user's"}
+
+
+def test_a_failure_changes_nothing_and_names_files_in_the_folder(tmp_path):
+    write_results(tmp_path, {"a": b"1"})
+
+    def fail():
+        with replace_results(tmp_path, ["a", "b"]) as new:
+            (new.path / "b").write_bytes(b"2")
+            raise InputError("is bad", file=new.path / "b")
+
+    with pytest.raises(InputError) as failure:
+        fail()
+    assert str(failure.value) == f"{tmp_path / 'b'}: is bad"
+    assert contents(tmp_path) == {"a": b"1"}
+
+
+def test_results_are_not_lost_to_a_file_that_came_meanwhile(tmp_path):
+    def write_slowly():
+        with replace_results(tmp_path, ["a", "b"]) as new:
+            for name in "ab":
+                (new.path / name).write_bytes(b"new")
+            (tmp_path / "b").write_bytes(b"user's")
+
+    with pytest.raises(OutputError, match="new-results"):
+        write_slowly()
+    assert contents(tmp_path) == {"b": b"user's", "new-results/a": b"new", "new-results/b": b"new"}
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
+def test_ctrl_c_at_any_moment_leaves_all_earlier_files_or_all_new_ones(tmp_path):
+    earlier, later = {"a": b"1", "gone": b"1"}, {"a": b"2", "come": b"2"}
+    planned, ends = [*earlier, *later], set()
+    for number in count(1, 3):
+        write_results(tmp_path, earlier, planned)
+        sys.setprofile(interrupt_call(number))
+        try:
+            write_results(tmp_path, later, planned)
+        except KeyboardInterrupt:
+            sys.setprofile(None)
+            remove_unfinished()
+        else:
+            break
+        finally:
+            sys.setprofile(None)
+        found = contents(tmp_path)
+        assert found in (earlier, later)
+        ends.add(found == later)
+    assert ends == {False, True}
+
+
+HOLD = """
+import sys, time
+from crossfield.models.storage import replace_results, replacing
+with replacing(sys.argv[1] + "/a") as stream, replace_results(sys.argv[1], ["b"]) as new:
+    stream.write(b"half")
+    (new.path / "b").write_bytes(b"half")
+    print("ready", flush=True)
+    time.sleep(600)
+"""
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid"), reason="takes locks of POSIX")
+@pytest.mark.parametrize(
+    "container", [(), pytest.param(("unshare", "-Upfr", "--kill-child"), marks=pytest.mark.needs("unshare"))]
+)
+def test_unfinished_files_stay_while_their_process_lives_also_in_another_container(tmp_path, container):
+    """Two containers can have one host name, and processes of the same numbers."""
+    command = [*container, sys.executable, "-c", HOLD, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            assert process.stdout.readline() == "ready\n"
+            unfinished = contents(tmp_path)
+            assert len(unfinished) == 2
+            storage.remove_dead.cache_clear()
+            write_bytes(tmp_path / "c", b"mine")
+            assert contents(tmp_path) == unfinished | {"c": b"mine"}
+        finally:
+            process.kill()
+    process.wait()
+    for _ in range(600):  # the process in the container ends a little after its parent
+        storage.remove_dead.cache_clear()
+        write_bytes(tmp_path / "c", b"mine")
+        if len(contents(tmp_path)) == 1:
+            break
+    assert contents(tmp_path) == {"c": b"mine"}
+
+
+def test_temporary_files_of_other_programs_stay(tmp_path):
+    others = {".x.part": b"", ".x.crossfield-0123.part": b"", ".x.0123abcd-17-0123abcd.part": b""}
+    for name, data in others.items():
+        (tmp_path / name).write_bytes(data)
+    storage.remove_dead.cache_clear()
+    write_bytes(tmp_path / "a", b"")
+    assert contents(tmp_path) == others | {"a": b""}
