@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 from crossfield.export.cli.app import app as commands
-from crossfield.export.cli.help_texts import EXAMPLES, fill_names
+from crossfield.export.cli.help_texts import fill_names
 from sphinx.util.docutils import SphinxDirective
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ def _group(prefix: str, group: Any) -> Iterator[str]:
 def _command(title: str, command: Any) -> Iterator[str]:
     context = command.make_context(title, [], resilient_parsing=True)
     yield from (f"## {title}", "", _text(command.help or ""), "")
-    yield from ("```sh", EXAMPLES[title.partition(" ")[2]], "```", "")
+    yield from ("```sh", command.epilog.removeprefix("Example: "), "```", "")
     for head, kind in (("Argument", "argument"), ("Option", "option")):
         records = [
             parameter.get_help_record(context)

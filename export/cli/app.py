@@ -21,7 +21,6 @@ from ...models.errors import CrossfieldError, InputError, shortened
 from ...models.storage import remove_unfinished, replace_results, require_suffix
 from ...models.written_files import check_targets
 from . import options
-from .help_texts import Group
 from .inputs import (
     SAVED,
     check_names,
@@ -55,9 +54,9 @@ from .verify_command import verify_command
 
 app = typer.Typer(
     name="crossfield",
-    cls=Group,
-    help="Example: crossfield run mouse -o out\n\nWrite a concept sketch as optimization problems for any"
-    " solver, and turn a solver's answer into a cross field: two line directions at every pixel.",
+    help="Write a concept sketch as optimization problems for any solver, and turn a solver's answer into a"
+    " cross field: two line directions at every pixel.",
+    epilog="Example: crossfield run mouse -o out",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -88,7 +87,7 @@ def root(
         raise typer.Exit
 
 
-@command("run")
+@command("run", "crossfield run mouse -o out --time-limit 5")
 def run_command(
     source: options.Input,
     output: options.Folder,
@@ -130,7 +129,7 @@ def run_command(
         print_notice(f"the earlier run stays in {output}; the new results are in {report.folder}")
 
 
-@command("instance")
+@command("instance", "crossfield instance mouse --size 48 -o mouse.json")
 def instance_command(
     source: options.Input,
     output: options.Output,
@@ -164,7 +163,7 @@ def instance_command(
     print_line(f"{output}: {instance.summary}")
 
 
-@command("export")
+@command("export", "crossfield export skew --size 4 -f milp-mccormick -F mps -F lp -o files")
 def export_command(
     source: options.Input,
     output: options.Folder,
@@ -229,11 +228,11 @@ def export_command(
     printing.show(documents, lambda: show_manifests(instance, documents, output, complete=not formulation))
 
 
-command("solve")(solve_command)
-command("prove")(prove_command)
+command("solve", "crossfield solve mouse --size 48 --method bend -o field")(solve_command)
+command("prove", "crossfield prove skew --size 5 -o proof")(prove_command)
 
 
-@command("read")
+@command("read", "crossfield read skew.sol --manifest files/skew.milp-mccormick.manifest.json -o skew.npz")
 def read_command(
     solution: options.SolutionFile,
     manifest: options.Manifest,
@@ -295,7 +294,7 @@ def read_command(
         raise SolutionError(f"{answer.doubt}; no field was written{remedy}", file=solution)
 
 
-@command("draw")
+@command("draw", "crossfield draw field/mouse.bend.field.npz --kind overview -o field.png")
 def draw_command(
     source: options.FieldOrInstance,
     output: options.Output,
@@ -321,19 +320,19 @@ def draw_command(
     print_line(str(output))
 
 
-command("shade")(shade_command)
-command("studio")(studio_command)
-command("verify")(verify_command)
+command("shade", "crossfield shade field/mouse.bend.field.npz --underlay mouse -o surface")(shade_command)
+command("studio", "crossfield studio mouse")(studio_command)
+command("verify", "crossfield verify files --solve 2")(verify_command)
 
 
-@command("list")
+@command("list", "crossfield list")
 def list_command(*, as_json: options.Json = False) -> None:
     """List samples, formulations, formats, solvers and methods, and their combinations."""
     from .tables import tables
 
     content = tables()
     if as_json:
-        print_json({name: rows for name, (_, rows) in content.items()})
+        print_json(content)
     else:
         show_lists(content)
 

@@ -4,32 +4,28 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Final
+from typing import Annotated
 
 import typer
 
-from .help_texts import FACTS, Group
 from .option_groups import command as command_of
 from .options import Folder, Force, PrintOptions, Processes, Seconds
 from .output import print_line, print_notice, show_progress
 
-_SUMMARY: Final = "Build, check and solve a library: instances in every formulation, with best known points."
-
 library = typer.Typer(
-    cls=Group,
-    help=f"Example: crossfield library build default -o library\n\n{_SUMMARY}",
-    short_help=_SUMMARY,
+    help="Build, check and solve a library: instances in every formulation, with best known points.",
+    epilog="Example: crossfield library build default -o library",
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 command = partial(command_of, library)
 
-_fact = partial(typer.Option, rich_help_panel=FACTS)
+_fact = partial(typer.Option, rich_help_panel="Facts about the run")
 
 Library = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield library build` wrote.")]
 
 
-@command("build")
+@command("build", "crossfield library build small.toml -o library")
 def build_command(
     spec: Annotated[
         str,
@@ -117,7 +113,7 @@ def build_command(
         raise typer.Exit(1)
 
 
-@command("get")
+@command("get", "crossfield library get cf_mouse_n004_exact -o models")
 def get_command(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="NAME...", help="Entries; by default all that are selected.")
@@ -150,7 +146,7 @@ def get_command(
     printing.show(written, lambda: print_line(f"{output}: {number} files of {len(written)} entries"))
 
 
-@command("solve")
+@command("solve", "crossfield library solve library --solver highs --time-limit 2")
 def solve_command(
     folder: Library,
     *,
@@ -193,7 +189,7 @@ def solve_command(
     printing.show(records, lambda: print_line(line))
 
 
-@command("verify")
+@command("verify", "crossfield library verify library")
 def verify_command(
     folder: Library,
     *,

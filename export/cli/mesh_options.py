@@ -6,6 +6,7 @@ Their refusal is one DomainError, which `Instance.grid` raises. docs/architectur
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -15,6 +16,8 @@ from ...models.errors import DomainError
 
 if TYPE_CHECKING:
     from ...models.instance.instance import Instance
+
+_mesh_option = partial(typer.Option, rich_help_panel="Mesh")
 
 SKETCHES_ONLY: Final = ("shade", "studio")
 """Commands that take pixels of sketches alone."""
@@ -26,7 +29,7 @@ class MeshOptions:
 
     sharp: Annotated[
         float | None,
-        typer.Option(
+        _mesh_option(
             "--sharp",
             metavar="DEGREES",
             help="Strokes along the edges of a mesh whose faces meet at this angle or more, above 0 (flat),"
@@ -35,7 +38,7 @@ class MeshOptions:
     ] = None
     directions: Annotated[
         Path | None,
-        typer.Option(
+        _mesh_option(
             "--directions",
             metavar="FILE",
             help="More strokes of a mesh: a table face,x,y,z (CSV) of directions in space, faces from 0, or"
@@ -44,7 +47,7 @@ class MeshOptions:
     ] = None
     weights: Annotated[
         Literal["unit", "dual"],
-        typer.Option(
+        _mesh_option(
             "--weights",
             help="Weights of neighbouring faces in the smoothness: all 1 (unit), or the length of their edge"
             " over the distance of their centres (dual).",

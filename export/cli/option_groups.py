@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import MISSING, fields, is_dataclass
+from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from functools import wraps
 from inspect import Parameter, Signature, signature
 from typing import Any, get_type_hints
@@ -13,9 +13,10 @@ import typer
 from .help_texts import Command
 
 
-def command(app: typer.Typer, name: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Decorator that adds a function to the app as a command of this name."""
-    return lambda function: app.command(name, cls=Command)(_expand_option_groups(function))
+def command(app: typer.Typer, name: str, example: str) -> Callable[[Callable[..., None]], Any]:
+    """Decorator that adds a function to the app as a command of this name; the example ends its help."""
+    add = app.command(name, cls=Command, epilog=f"Example: {example}")
+    return lambda function: add(_expand_option_groups(function))
 
 
 def _expand_option_groups(function: Callable[..., None]) -> Callable[..., None]:
@@ -23,17 +24,14 @@ def _expand_option_groups(function: Callable[..., None]) -> Callable[..., None]:
 
     typer reads the options from the signature of the command. The function receives the dataclass.
     """
-    hints = get_type_hints(function, include_extras=True)
-    groups: dict[str, Any] = {name: hint for name, hint in hints.items() if is_dataclass(hint)}
-    parameters = [
-        option
-        for name, parameter in signature(function).parameters.items()
-        for option in (
-            _option_parameters(groups[name])
-            if name in groups
-            else [parameter.replace(annotation=hints[name])]
-        )
-    ]
+    groups: dict[str, Any] = {}
+    parameters: list[Parameter] = []
+    for parameter in _parameters(function):
+        if is_dataclass(group := parameter.annotation):
+            groups[parameter.name] = group
+            parameters += [option.replace(kind=Parameter.KEYWORD_ONLY) for option in _parameters(group)]
+        else:
+            parameters.append(parameter)
 
     @wraps(function)
     def wrapped(*arguments: Any, **values: Any) -> None:
@@ -47,9 +45,7 @@ def _expand_option_groups(function: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-def _option_parameters(group: Any) -> Iterator[Parameter]:
-    """One keyword parameter per field of a dataclass."""
-    hints = get_type_hints(group, include_extras=True)
-    for field in fields(group):
-        default = Parameter.empty if field.default is MISSING else field.default
-        yield Parameter(field.name, Parameter.KEYWORD_ONLY, default=default, annotation=hints[field.name])
+def _parameters(target: Any) -> list[Parameter]:
+    """Parameters of a function or a dataclass, with their types instead of the names of these."""
+    hints = get_type_hints(target, include_extras=True)
+    return [option.replace(annotation=hints[option.name]) for option in signature(target).parameters.values()]

@@ -16,9 +16,11 @@ from .output import print_json, print_line, show_facts
 _SKETCH: Final = "a drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples};"
 _SAVED: Final = "or an instance file (.json, .npz)."
 
-_folder = partial(typer.Option, "-o", "--output", metavar="DIR")
+_output = partial(typer.Option, rich_help_panel="Output")
+_folder = partial(_output, "-o", "--output", metavar="DIR")
+_formulating = partial(typer.Option, rich_help_panel="Formulation")
 _method = partial(typer.Option, "-m", "--method", metavar="NAME")
-_formulation = partial(typer.Option, "-f", "--formulation", metavar="NAME")
+_formulation = partial(_formulating, "-f", "--formulation", metavar="NAME")
 _time_limit = partial(typer.Option, "--time-limit", min=0.1, metavar="SECONDS")
 _gap = partial(typer.Option, "--gap", min=0.0)
 _jobs = partial(typer.Option, "--jobs", min=1, max=MOST)
@@ -27,7 +29,7 @@ _jobs = partial(typer.Option, "--jobs", min=1, max=MOST)
 def _norm_option(option: str, terms: str) -> Any:
     """Option for a norm."""
     words = f"{terms} in absolute values (1) or squares (2), where a formulation offers both."
-    return typer.Option(option, min=1, max=2, help=words)
+    return _formulating(option, min=1, max=2, help=words)
 
 
 # Input and output
@@ -59,11 +61,11 @@ Exported = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `cros
 Folder = Annotated[Path, _folder(help="Folder for the files; created if it does not exist.")]
 ProofFolder = Annotated[Path | None, _folder(help="Folder for field, certificate and report.")]
 Output = Annotated[
-    Path, typer.Option("-o", "--output", metavar="FILE", help="File to write; its suffix selects the format.")
+    Path, _output("-o", "--output", metavar="FILE", help="File to write; its suffix selects the format.")
 ]
 Force = Annotated[
     bool,
-    typer.Option(
+    _output(
         "--force",
         help="Replace also files that crossfield has not written or that have changed since, and better"
         " results than the new ones. Without it, the command stops before any work if such files are in the"
@@ -93,7 +95,7 @@ Start = Annotated[
 ]
 Tightened = Annotated[
     Path | None,
-    typer.Option(
+    _formulating(
         "--tightened",
         metavar="PROOF",
         help="Certificate (.npz) on the same instance, which is checked first. The bounds of alpha, beta and"
@@ -104,8 +106,8 @@ Check = Annotated[
     Path | None,
     typer.Option("--check", metavar="FILE", help="Only check this certificate and print what it proves."),
 ]
-Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="Print nothing but errors.")]
-Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Quiet = Annotated[bool, _output("-q", "--quiet", help="Print nothing but errors.")]
+Json = Annotated[bool, _output("--json", help="Print the result as JSON.")]
 
 
 @dataclass(frozen=True)
@@ -137,7 +139,7 @@ class PrintOptions:
 
 Facet = Annotated[
     Literal["hull", "printed"] | None,
-    typer.Option("--facet", help="Inequality (26) of the paper: corrected (hull, exact), or as printed."),
+    _formulating("--facet", help="Inequality (26) of the paper: corrected (hull, exact), or as printed."),
 ]
 
 
@@ -145,13 +147,13 @@ StrokeNorm = Annotated[int | None, _norm_option("--stroke-norm", "Distance from 
 BetaNorm = Annotated[int | None, _norm_option("--beta-norm", "Skew beta")]
 Relax = Annotated[
     bool,
-    typer.Option(
+    _formulating(
         "--relax", help="Let integers take any value within their bounds, which gives a lower bound."
     ),
 ]
 ResidualLimits = Annotated[
     bool,
-    typer.Option(
+    _formulating(
         "--limits",
         help="Limit residuals of orthogonal crosses to what no change of one jump improves; the optimum "
         "stays.",
@@ -228,7 +230,7 @@ ProofGap = Annotated[
 ]
 Norm = Annotated[
     Literal["1", "2", "mixed"],
-    typer.Option(
+    _formulating(
         "--norm",
         help="Norm of the energy: squares (2), absolute values (1, as in milp-mccormick), or absolute values"
         " of the smoothness with squares of the other terms (mixed, as in miqp-mccormick).",

@@ -348,27 +348,24 @@ def _format_value(value: object) -> str:
     return f"{value + 0.0:.10g}" if isinstance(value, float) else str(value)
 
 
-def show_lists(tables: dict[str, tuple[tuple[str, ...], list[dict[str, Any]]]]) -> None:
+def show_lists(tables: dict[str, list[dict[str, Any]]]) -> None:
     """Print all tables, from samples to readers of solution files."""
 
-    def show(title: str, name: str, columns: Sequence[str] = ()) -> None:
-        of_table, rows = tables[name]
-        show_table(
-            title, columns or of_table, [[str(row[key]) for key in columns or of_table] for row in rows]
-        )
+    def show(title: str, name: str, *columns: str) -> None:
+        columns = columns or tuple(tables[name][0])
+        show_table(title, columns, [[str(row[column]) for column in columns] for row in tables[name]])
 
     show("samples", "samples")
-    show("formulations", "formulations", ("name", "short", "paper", "class", "summary"))
-    names = [row["name"] for row in tables["formats"][1]]
+    show("formulations", "formulations", "name", "short", "paper", "class", "summary")
+    formats = [row["name"] for row in tables["formats"]]
     carried = [
-        [row["name"], *(re.split("[:,]", row[name])[0] for name in names)]
-        for row in tables["formulations"][1]
+        [row["name"], *(re.split("[:,]", row[name])[0] for name in formats)] for row in tables["formulations"]
     ]
-    show_table("formulations in each format (--json: alternatives)", ("formulation", *names), carried)
-    (first, *bundled), rows = tables["solvers"]
+    show_table("formulations in each format (--json: alternatives)", ("formulation", *formats), carried)
+    (first, *bundled), rows = tables["solvers"][0], tables["solvers"]
     marked = [[row[first], *("yes" if row[name] == "yes" else "-" for name in bundled)] for row in rows]
     show_table("formulations that each bundled solver solves (--json: reasons)", (first, *bundled), marked)
-    (first, *solvers), rows = tables["externals"]
+    (first, *solvers), rows = tables["externals"][0], tables["externals"]
     takes = [[name, ", ".join(row[first] for row in rows if row[name] == "yes")] for name in solvers]
     title = "formulations whose optimum each solver proves from our files (--json: reasons)"
     show_table(title, ("solver", "formulations"), takes)

@@ -7,6 +7,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Final, Literal
 
@@ -19,8 +20,9 @@ from .output import print_warnings
 if TYPE_CHECKING:
     from ...models.instance.instance import Instance
 
+_sketch_option = partial(typer.Option, rich_help_panel="Sketch")
 Size = Annotated[
-    int | None, typer.Option("--size", help="Pixels on the longer side of the grid; {size} by default.")
+    int | None, _sketch_option("--size", help="Pixels on the longer side of the grid; {size} by default.")
 ]
 
 _PLAIN: Final = MeshOptions()
@@ -33,7 +35,7 @@ class SketchOptions:
     size: Size = None
     mask: Annotated[
         Path | None,
-        typer.Option(
+        _sketch_option(
             "--mask",
             metavar="FILE",
             help="Picture of the same size as the sketch, white where the field is wanted.",
@@ -41,7 +43,7 @@ class SketchOptions:
     ] = None
     silhouette: Annotated[
         Literal["none", "outer"],
-        typer.Option(
+        _sketch_option(
             "--silhouette",
             help="Strokes along the outline of the drawing carry no direction (outer), or are curvature lines"
             " like all others (none).",
@@ -49,7 +51,7 @@ class SketchOptions:
     ] = "none"
     curvature: Annotated[
         list[str] | None,
-        typer.Option(
+        _sketch_option(
             "--curvature",
             metavar="LABEL",
             help="Label of the strokes that are curvature lines, such as colour=red, class=flow, id=group2,"
@@ -59,7 +61,7 @@ class SketchOptions:
     ] = None
     view: Annotated[
         str | None,
-        typer.Option(
+        _sketch_option(
             "--view",
             metavar="VIEW",
             help="Viewpoint of a .curves file: front, side, top, or azimuth and elevation in degrees, as in"
@@ -68,7 +70,7 @@ class SketchOptions:
     ] = None
     stroke_weight: Annotated[
         float | None,
-        typer.Option(
+        _sketch_option(
             "--stroke-weight",
             metavar="X",
             help="Weight of the distance from the strokes, 0 to {most weight} (to less on grids below 24"

@@ -10,45 +10,26 @@ from ...models.formulations.problem import Problem
 from ...models.sketch.samples import samples
 from ..formats.registry import FORMATS, problem_in_format
 from ..solutions.readers.registry import READERS
-from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, smallest_problem, suitabilities
+from ..solvers_table import BUNDLED, PROGRAMS, smallest_problem, suitabilities
 from ..solving.local import choose_format
 from ..solving.methods import METHODS
 
 Row = dict[str, Any]
-Tables = dict[str, tuple[tuple[str, ...], list[Row]]]
 
 
-def tables() -> Tables:
-    """Columns and rows of each table, computed from the code."""
+def tables() -> dict[str, list[Row]]:
+    """Rows of each table, computed from the code."""
+    problems = smallest_problems()
     return {
-        "samples": (
-            ("name", "kind", "description"),
-            [
-                {"name": entry.name, "kind": entry.kind, "description": entry.description}
-                for entry in samples()
-            ],
-        ),
-        "formulations": (
-            ("name", "short", "paper", "class", "summary", *FORMATS),
-            [_formulation_row(problem) for problem in smallest_problems()],
-        ),
-        "formats": (
-            ("name", "written", "dialects", "verified by", "summary"),
-            [_format_row(name) for name in FORMATS],
-        ),
-        "solvers": (
-            ("formulation", *BUNDLED),
-            [_solver_row(problem, relaxed) for problem, relaxed in _list_relaxations()],
-        ),
-        "externals": (("formulation", *SOLVERS), [_external_row(problem) for problem in smallest_problems()]),
-        "methods": (
-            ("name", "summary"),
-            [{"name": method.name, "summary": method.summary} for method in METHODS.values()],
-        ),
-        "readers": (
-            ("name", "description"),
-            [{"name": reader.name, "description": reader.description} for reader in READERS],
-        ),
+        "samples": [
+            {"name": entry.name, "kind": entry.kind, "description": entry.description} for entry in samples()
+        ],
+        "formulations": [_formulation_row(problem) for problem in problems],
+        "formats": [_format_row(name) for name in FORMATS],
+        "solvers": [_solver_row(problem, relaxed) for problem, relaxed in _list_relaxations()],
+        "externals": [_external_row(problem) for problem in problems],
+        "methods": [{"name": method.name, "summary": method.summary} for method in METHODS.values()],
+        "readers": [{"name": reader.name, "description": reader.description} for reader in READERS],
     }
 
 

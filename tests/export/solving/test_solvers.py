@@ -132,7 +132,7 @@ def split(label):
     return label.removesuffix(", relaxed"), label.endswith(", relaxed")
 
 
-PAIRS = [(row["formulation"], solver, row[solver]) for row in tables()["solvers"][1] for solver in BUNDLED]
+PAIRS = [(row["formulation"], solver, row[solver]) for row in tables()["solvers"] for solver in BUNDLED]
 DONE = [(label, solver) for label, solver, answer in PAIRS if answer == "yes"]
 REFUSED = [(label, solver, answer) for label, solver, answer in PAIRS if answer != "yes"]
 
