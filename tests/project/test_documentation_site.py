@@ -40,7 +40,7 @@ def test_every_command_and_its_options_are_listed(site):
     options = set(re.findall(r"(--[a-z-]+)", shown)) - {"--help"}
     section = page.partition('id="crossfield-prove"')[2].partition("<section")[0]
     assert {option for option in options if option not in section} == set()
-    assert "crossfield library submit" in page
+    assert "crossfield library verify" in page
     assert not re.search(r"\{[a-z ]+\}", re.sub(r"<(style|script).*?</\1>", "", page, flags=re.DOTALL))
 
 
