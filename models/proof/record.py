@@ -104,7 +104,7 @@ class Proof(Claim):
     pieces
         The arrays of the certificate that prove the last step, None without one.
     reason
-        Why nothing is proven, where `ended` does not tell; empty otherwise.
+        Why nothing is proven, where `ended` does not state it; empty otherwise.
 
     """
 

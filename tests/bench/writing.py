@@ -286,8 +286,8 @@ def measure_growth(measure: Measure, sizes: Sequence[int], folder: Path) -> dict
     loads = describe_loads([row["load"] for row in rows.values()])
     largest = facts[-1]
     system = (
-        f"At {largest['million pairs']} million pairs, the system takes {largest['CPU s of the system']} s and the "
-        f"program {largest['CPU s of the program']} s."
+        f"At {largest['million pairs']} million pairs, the system takes {largest['CPU s of the system']} s "
+        f"and the program {largest['CPU s of the program']} s."
     )
     return {"growth": f"Straight lines, without time of the system: {'; '.join(fits)}. {system} {loads}"}
 
