@@ -16,7 +16,7 @@ LEAST = 1e-9
 """Least size of a number in a file: readers of files drop smaller ones."""
 WRITTEN = [*SMALL, "1155-pixels-weighted"]
 FEW = [name for name in TINY if len(kind(name).domain.first) <= 1 and name != "two-triangles-skewed"]
-"""Kinds that SCIP solves in 20,000 nodes; the optimum 0 of the other one takes more where it is not convex."""
+"""Kinds that SCIP solves in 20,000 nodes; non-convex models of the other one, of optimum 0, take more."""
 
 
 def problem_of(name, formulation, **options):
