@@ -72,7 +72,7 @@ def keep_better_field(
     if earlier is None:
         return None
     was, found = value(earlier), None if now is None else value(now)
-    if found is not None and was >= found - SAME * abs(found):
+    if found is not None and was >= found - SAME * (1 + abs(found)):
         return None
     notice(kept_notice(name, f"energy {was:.6g}", "no field" if found is None else f"energy {found:.6g}"))
     new.kept.add(name)

@@ -183,6 +183,7 @@ def write_all(
 
 def names_of_set(instance: Instance, name: str, formats: Iterable[str], *, compress: bool) -> list[str]:
     """Names of the files that a formulation of an instance can have in some formats, the manifest last."""
+    check_flag("compress", compress)
     stem, packed = f"{instance.name}.{name}", ".gz" * compress
     models = [file_names(f"{stem}{FORMATS[form].suffix}{packed}", form) for form in formats]
     starts = [start_name(stem, solver) for solver in STARTS]
@@ -219,7 +220,6 @@ def _write_problem_files(
     compress: bool,
 ) -> Manifest:
     """Write the files of a problem, its starting points and its manifest."""
-    check_flag("compress", compress)
     stem, written, refused = file_stem(problem), [], {}
     for name in dict.fromkeys(formats):
         entry = FORMATS[name]

@@ -51,7 +51,7 @@ _ARCHIVE: Final = {
 }
 _MOST_JUMP: Final = 1_000_000
 _NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
-SAME: Final = 1e-9  # relative difference of energies up to which none is the lower one
+SAME: Final = 1e-9  # difference of energies, relative to them plus 1, up to which none is the lower one
 _Entry = TypeVar("_Entry")
 
 
@@ -86,7 +86,7 @@ def write_field(field: CrossField, path: str | Path, *, force: bool = False) -> 
     write = _look_up_suffix(_WRITERS, path, "written")
     names = field_names(path.name)
     check_targets(path.parent, names, force=force)
-    if not force:
+    if not force and path.suffix.lower() != ".rosy":  # its crosses have right angles, so another energy
         _check_not_worse(field, path)
     contents: list[Callable[[CrossField], bytes]] = [write, lambda field: to_obj(field.instance), to_sings]
     with ExitStack() as stack:  # the files get their names together, at its end
@@ -116,7 +116,7 @@ def _check_not_worse(field: CrossField, path: Path) -> None:
     if earlier is None:
         return
     energies = [(earlier.energy(norm).total, field.energy(norm).total) for norm in _NORMS]
-    if all(was < now - SAME * now for was, now in energies):
+    if all(was < now - SAME * (1 + now) for was, now in energies):
         was, now = energies[0]
         raise OutputError(
             f"has a field of lower energy ({was:.6g}, now {now:.6g}) in every norm; choose another name, or "

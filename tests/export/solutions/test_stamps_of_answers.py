@@ -98,6 +98,7 @@ def by_ampl_library(model, answer):
     cf.write(problem, mps)
     by_highs(mps, answer, 0)
     point = read_solution(answer, problem).point
+    answer.unlink()
     write_ampl_sol(answer, "optimal solution found", point[NlOrder(problem).order], problem.n_rows, 0)
     answer.write_text(re.sub(r"(?<=Options\n)3\n1\n1\n0\n", options, answer.read_text()))
 

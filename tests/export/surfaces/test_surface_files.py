@@ -135,16 +135,16 @@ def test_strokes_of_the_drawing_lie_over_the_surface(tmp_path):
         write_surface(ball(8), tmp_path / "none", drawing="bottle")
 
 
-def test_what_fails_leaves_no_report_of_an_earlier_surface(tmp_path):
+def test_what_fails_leaves_an_earlier_surface_as_it_is(tmp_path):
     write_surface(ball(8), tmp_path / "there", side=20)
+    report = (tmp_path / "there" / "surface.json").read_bytes()
     with pytest.raises(InputError, match="give 1 to"):
         write_surface(ball(8), tmp_path / "there", side=-1)
-    assert (tmp_path / "there" / "surface.json").exists()  # nothing was begun
     (tmp_path / "there" / "heights.npy").unlink()
     (tmp_path / "there" / "heights.npy").mkdir()
     with pytest.raises(OutputError, match="heights"):
         write_surface(ball(8), tmp_path / "there", side=20)
-    assert not (tmp_path / "there" / "surface.json").exists()
+    assert (tmp_path / "there" / "surface.json").read_bytes() == report
     assert not list((tmp_path / "there").glob("*.part"))
 
 

@@ -139,11 +139,12 @@ def test_search_is_never_above_what_it_starts_from(name):
     assert_feasible(result)
 
 
-def test_a_start_on_another_instance_is_refused():
+def test_a_start_on_another_instance_is_refused_and_one_in_the_other_gauge_is_taken():
     start = greedy_field(cf.sample("skew", 6))
-    for other in (cf.sample("skew", 5), start.instance.with_gauge("box")):
-        with pytest.raises(InstanceError, match=r"the field is on another instance .* not on this one"):
-            cf.search(other, rounds=0, jobs=1, start=start)
+    with pytest.raises(InstanceError, match=r"the field is on another instance .* not on this one"):
+        cf.search(cf.sample("skew", 5), rounds=0, jobs=1, start=start)
+    other = start.instance.with_gauge("box")
+    assert cf.search(other, rounds=0, jobs=1, start=start).field.instance is other
 
 
 def test_a_small_grid_is_searched_from_several_starts():
