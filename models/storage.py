@@ -22,7 +22,7 @@ if sys.platform != "win32":
     import fcntl
 
 from .errors import CrossfieldError, InputError, OutputError
-from .written_files import MARK, add_to_list, check_targets, is_unchanged, sha256_of
+from .written_files import MARK, add_to_list, check_targets, is_unchanged, reason_of, sha256_of
 
 _UNFINISHED: Final[set[Path]] = set()
 _LONGEST: Final = 50  # characters of a name that a neighbour's name repeats, at most 200 of 255 bytes
@@ -51,7 +51,7 @@ def replacing(
             temporary.replace(path)
         except OSError as error:
             raise OutputError(
-                f"cannot be written: {_reason(error)}; free some space or choose another folder", file=path
+                f"cannot be written: {reason_of(error)}; free some space or choose another folder", file=path
             ) from error
 
 
@@ -154,7 +154,7 @@ def _install(steps: dict[str, Path | None], folder: Path) -> None:
                 interrupt = error
     except OSError as error:
         raise OutputError(
-            f"cannot be written: {_reason(error)}; choose another folder", file=folder
+            f"cannot be written: {reason_of(error)}; choose another folder", file=folder
         ) from error
     if interrupt is not None:
         raise interrupt
@@ -188,7 +188,7 @@ def _temporary_neighbour(path: Path, create: Callable[[Path], object]) -> Iterat
                     lock = _lock(temporary)
         except OSError as error:
             raise OutputError(
-                f"cannot be written: {_reason(error)}; choose another folder", file=path
+                f"cannot be written: {reason_of(error)}; choose another folder", file=path
             ) from error
         yield temporary
     finally:
@@ -288,7 +288,7 @@ def read_bytes(path: str | Path, most: int | None = None, remedy: str = "give a 
             raise InputError(f"has {status.st_size} bytes; at most {most} are read, {remedy}", file=path)
         return Path(path).read_bytes()
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot be read: {_reason(error)}", file=path) from error
+        raise InputError(f"cannot be read: {reason_of(error)}", file=path) from error
 
 
 def make_folder(path: str | Path) -> Path:
@@ -296,10 +296,8 @@ def make_folder(path: str | Path) -> Path:
     path = Path(path)
     try:
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise OutputError(f"cannot be created: {_reason(error)}; choose another folder", file=path) from error
+    except (OSError, ValueError) as error:
+        raise OutputError(
+            f"cannot be created: {reason_of(error)}; choose another folder", file=path
+        ) from error
     return path
-
-
-def _reason(error: OSError | ValueError) -> str:
-    return (getattr(error, "strerror", None) or str(error)).lower()

@@ -89,9 +89,9 @@ def check_targets(
     """
     names = list(dict.fromkeys(names))
     for parent in {(folder / name).parent for name in names}:
-        if parent.exists() and not parent.is_dir():
+        if _exists(parent) and not parent.is_dir():
             raise OutputError("is no folder; choose another folder", file=parent)
-    present = [name for name in names if os.path.lexists(folder / name)]
+    present = [name for name in names if _exists(folder / name)]
     read = [path.stat() for path in map(Path, reads) if path.exists()]
     for name in present:
         target = folder / name
@@ -123,6 +123,22 @@ def check_targets(
 def kept_notice(name: str, was: str, now: str) -> str:
     """A line about a better result that stays."""
     return f"kept the earlier {name} ({was}; now {now}); replace it with {FORCE}"
+
+
+def _exists(path: Path) -> bool:
+    """Whether there is a file, folder or link. Raises OutputError for a name that none can have."""
+    try:
+        path.lstat()
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    except (OSError, ValueError) as error:  # too long, or with a null byte
+        raise OutputError(f"cannot be written: {reason_of(error)}; choose another name", file=path) from error
+    return True
+
+
+def reason_of(error: OSError | ValueError) -> str:
+    """The system's words for an error of a file, without number and name."""
+    return (getattr(error, "strerror", None) or str(error)).lower()
 
 
 def _is_temporary(folder: Path) -> bool:

@@ -280,3 +280,21 @@ def test_a_shorter_run_loses_neither_the_certificate_nor_the_lowest_field(tmp_pa
     assert second.best.field.energy().total <= first.best.field.energy().total * (1 + 1e-9)
     if second.best.method == "earlier run":
         assert {name: contents(tmp_path)[name] for name in kept} == kept
+
+
+@pytest.mark.parametrize("name", ["null\0byte", "long" * 1000], ids=["null byte", "long"])
+def test_names_that_no_file_can_have_are_refused(name, tmp_path):
+    instance = cf.sample("skew", 5)
+    field = cf.greedy_field(instance)
+    problem = cf.formulate(instance, "milp-mccormick")
+    for write in (
+        lambda: cf.write_instance(instance, tmp_path / f"{name}.json"),
+        lambda: cf.write_field(field, tmp_path / f"{name}.npz"),
+        lambda: cf.write(problem, tmp_path / f"{name}.lp"),
+        lambda: cf.draw(field, tmp_path / f"{name}.png"),
+        lambda: cf.write_problem(problem, tmp_path / name),
+        lambda: cf.write_surface(cf.surface(field), tmp_path / name),
+    ):
+        with pytest.raises(cf.OutputError, match=r"another (name|folder)"):
+            write()
+    assert list(tmp_path.iterdir()) == []
