@@ -42,7 +42,11 @@ def add_to_list(folder: Path, written: Mapping[str, str]) -> None:
     """Add files to the list of a folder, unless it is temporary. written: SHA-256 by name. Raises OSError."""
     if _is_temporary(folder):
         return
-    lines = b"".join(_line(name, digest) for name, digest in written.items())
+    lines = b"".join(
+        _line(name, digest)
+        for name, digest in written.items()
+        if not ((folder / name).exists() and _is_listed(folder, name, digest))
+    )
     flags = os.O_RDWR | os.O_APPEND | _PLAIN
     try:
         descriptor = os.open(folder / LIST, flags)
@@ -67,14 +71,19 @@ def is_unchanged(path: Path) -> bool:
     False for links, folders and files that cannot be read, and without a readable list.
     """
     try:
-        if not stat.S_ISREG(path.lstat().st_mode):
-            return False
-        line = _line(path.name, sha256_of(path))
+        return stat.S_ISREG(path.lstat().st_mode) and _is_listed(path.parent, path.name, sha256_of(path))
+    except OSError:
+        return False
+
+
+def _is_listed(folder: Path, name: str, digest: str) -> bool:
+    """Whether the list of a folder has this content of a file; False without a readable list."""
+    try:
         with (
-            open(os.open(path.parent / LIST, os.O_RDONLY | _PLAIN), "rb") as stream,  # noqa: PTH123
+            open(os.open(folder / LIST, os.O_RDONLY | _PLAIN), "rb") as stream,  # noqa: PTH123
             mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as listed,
         ):
-            return listed.rfind(b"\n" + line) >= 0  # from the end: the last writing is the likely one
+            return listed.rfind(b"\n" + _line(name, digest)) >= 0  # the last writing is the likely one
     except (OSError, ValueError):  # an empty list cannot be mapped
         return False
 
