@@ -107,6 +107,8 @@ def build_locked(
         tasks.run()
     complete = without_skipped(plans, work.skipped)
     if not any(planned.entries for planned in complete):
+        for error in work.failed.values():
+            raise error
         name, reason = next(iter(work.skipped.items()))
         raise InputError(f"none of its instances can be made; {name}: {reason}")
     write_ledger(ledger)
@@ -164,7 +166,9 @@ class _Build:
         self.folder, self.inputs, self.tasks, self.progress = folder, inputs, tasks, progress
         self.total, self.done = sum(len(planned.entries) for planned in self.inputs.plans), 0
         self.skipped: dict[str, str] = {}  # instances and entries that are not made, and the reasons
-        self.failed: dict[str, str] = {}  # those of them that are not too small and await no certificate
+        self.failed: dict[
+            str, CrossfieldError
+        ] = {}  # those of them that are not too small and await no certificate
         self.sums = _known_checksums(folder)
 
     def begin(self, planned: InstancePlan) -> None:
@@ -227,7 +231,7 @@ class _Build:
         self.total -= entries
         self.skipped[name] = str(error).removeprefix(f"{name}: ")
         if not isinstance(error, NoStrokeError):
-            self.failed[name] = self.skipped[name]
+            self.failed[name] = error
         self.progress(f"omitted: {name}: {self.skipped[name]}")
 
     def _finish(self, name: str) -> Callable[[Files | CrossfieldError], None]:

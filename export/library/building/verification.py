@@ -131,10 +131,11 @@ def _find_differences(
             again = Path(temporary)
             ledger, points = read_ledger(folder), all_points_of(library)
             rebuilt = build_locked(library.spec, again, ledger, points, jobs=jobs, progress=progress)
-            yield from (Defect(name, why) for name, why in rebuilt.failed.items())
+            yield from (Defect.of(error, name) for name, error in rebuilt.failed.items())
             present, built = _file_names(folder), _file_names(again)
             remedy = BUILD if has_unbuilt_records(library) else f"{_REMOVE}, and {BUILD}"
-            for name in (present | built) - {SUMS, *named}:
+            named_above = {name for name in present if name.startswith(tuple(rebuilt.failed))}
+            for name in (present | built) - {SUMS, *named} - named_above:
                 if name not in built:
                     yield Defect(name, "belongs to nothing in the library", _REMOVE)
                 elif name not in present:

@@ -13,7 +13,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
-from ....models.errors import InputError, InstanceError
+from ....models.errors import CrossfieldError, InputError, InstanceError
 from ....models.formulations.problem import Problem, formulate, with_windows
 from ....models.instance.file import read_document, read_instance
 from ....models.proof.certificate import Certificate, read_certificate
@@ -33,12 +33,12 @@ INDEX: Final = "library.json"
 class Library:
     """A built library: its folder and its checked index.
 
-    failed: names of instances and entries that its build could not make, and why.
+    failed: the errors of instances and entries that its build could not make, by name.
     """
 
     folder: Path
     document: dict[str, Any]
-    failed: Mapping[str, str] = field(default_factory=dict)
+    failed: Mapping[str, CrossfieldError] = field(default_factory=dict)
 
     @cached_property
     def entries(self) -> tuple[dict[str, Any], ...]:

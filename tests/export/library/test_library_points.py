@@ -178,7 +178,7 @@ def test_points_that_are_missing_or_damaged_are_reported(searched, tmp_path):
     known = shutil.copytree(searched, tmp_path / "points")
     spec = spec_of(tmp_path, 'points = "points"\n' + SPEC)
     (known / f"{STEM}.field.json").write_text("{}")
-    assert f"{STEM}.field.json" in " ".join(build(spec, tmp_path / "lib").failed.values())
+    assert f"{STEM}.field.json" in " ".join(map(str, build(spec, tmp_path / "lib").failed.values()))
     (known / f"{STEM}.field.json").unlink()
     with pytest.raises(InputError, match=rf"{STEM}\.field\.json: cannot be read"):
         build(spec, tmp_path / "lib")
