@@ -99,8 +99,8 @@ def build_command(
     printing.show(built.document, lambda: print_line(line))
     for name, reason in too_small.items():
         print_notice(f"{name} is skipped: {reason}")
-    for name, reason in built.failed.items():
-        print_notice(f"{name} failed: {reason}")
+    for name, error in built.failed.items():
+        print_notice(f"{name} failed: {error}")
     for reason in refused.values():
         print_notice(reason)
     if stale := sorted({record.entry for record in records_of_changed_problems(built)}):
