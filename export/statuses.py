@@ -62,7 +62,7 @@ def is_gap_closed(bound: float, objective: float) -> bool:
     return objective - bound <= max(absolute, relative * abs(objective))
 
 
-class _Row(NamedTuple):
+class _Claim(NamedTuple):
     """A row of the table: pattern of whole words or codes, their status, and their meaning."""
 
     words: re.Pattern[str]
@@ -71,11 +71,11 @@ class _Row(NamedTuple):
 
 
 @cache
-def _rows(layout: str) -> list[_Row]:
+def _rows(layout: str) -> list[_Claim]:
     """The rows of a layout, in the order of the table."""
     table = csv.DictReader(Path(__file__).with_suffix(".csv").read_text("utf-8").splitlines())
     return [
-        _Row(re.compile(row["words"], re.IGNORECASE), Status(row["status"]), row["meaning"])
+        _Claim(re.compile(row["words"], re.IGNORECASE), Status(row["status"]), row["meaning"])
         for row in table
         if row["layout"] == layout
     ]

@@ -104,8 +104,8 @@ def replace_results(
     ------
     OutputError
         At the beginning, for files in the way, with their names and remedies, and for a folder that cannot
-        be written. At the end, for files that came into the way meanwhile; the new ones then stay in a folder
-        that the message names.
+        be written. At the end, for files that came into the way during the work; the new ones then stay in a
+        folder that the message names.
 
     """
     folder, order, reads = make_folder(folder), list(dict.fromkeys(planned)), tuple(reads)
