@@ -31,7 +31,7 @@ RANDOM: Final = 8  # random instances of 5 x 5 pixels
 
 
 def subject_of(name: str) -> str:
-    """What a drawing shows: the name of its file without what differs between two files of one drawing."""
+    """The subject of a drawing: the name of its file, without suffix and mark of a rasterized copy."""
     return name.partition(".")[0].removesuffix("_rasterized")
 
 

@@ -110,7 +110,7 @@ def own_claims(entries: Facts) -> int:
 
 
 def optimum_of(facts: dict[str, Any]) -> tuple[Any, ...]:
-    """What entries with the same optimum have in common."""
+    """The facts that entries with the same optimum have in common."""
     norm = norm_minimised(facts["formulation"], facts["facet"])
     return facts["instance"], norm or (facts["formulation"], facts["facet"])
 

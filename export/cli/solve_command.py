@@ -93,7 +93,7 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
 
 
 class _Placing(NamedTuple):
-    """What decides on files in the way: those that are read, and whether the others are replaced."""
+    """Treatment of files in the way: files that are read, and whether others are replaced."""
 
     reads: list[str | Path]
     force: bool

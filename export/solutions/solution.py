@@ -291,7 +291,7 @@ class Solution:
 
     @property
     def _open_question(self) -> str:
-        """What a file whose claims are kept does not prove about its point, and how to state it."""
+        """The part of a claim that the file does not prove although it is kept, and how to state it."""
         if self.claimed.is_optimal and self.status is Status.LIMIT_WITH_POINT:
             return f"its dual bound {self.bound:.6g} leaves a gap, so it is not optimal within 1e-4"
         if self.status is Status.OPTIMAL_IN_GAP:

@@ -141,7 +141,7 @@ def prove(
 
 
 def _checked_proof(proof: _AnyProof, check: Callable[[], _AnyProof], progress: Progress) -> _AnyProof:
-    """What a check confirms of a proof: no level, with the reason, where it fails."""
+    """The part of a proof that a check confirms: no level, with the reason, where it fails."""
     if not proof.levels:
         return proof
     ended, reason = proof.ended, ""
