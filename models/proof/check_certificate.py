@@ -31,6 +31,7 @@ import sys
 import zipfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,7 @@ PRECISION = 2.0**-52
 ROUNDING = 64.0
 SLIVER = 2e-14
 MOST_BYTES = 1 << 31  # of all arrays
+_PIECE = 1 << 20  # bytes of a file that are read at once
 ROOM, MORE_ROOM = 1 << 28, 128  # memory for a certificate: a number, and one for each byte of its file
 MOST_LEVELS = 256
 MOST_SIDE = 9999
@@ -84,7 +86,9 @@ def read_file(path: str) -> bytes:
     """Read the bytes of a certificate."""
     try:
         with open(path, "rb") as stream:  # noqa: PTH123 - only built-in functions
-            return stream.read(MOST_BYTES + 1)
+            # Piece by piece: to read so many bytes makes room for all of them.
+            pieces = islice(iter(lambda: stream.read(_PIECE), b""), MOST_BYTES // _PIECE + 1)
+            return b"".join(pieces)
     except (OSError, ValueError) as error:
         raise UnreadableError(f"cannot be read ({type(error).__name__})") from error
 
