@@ -379,11 +379,14 @@ def _slow_rise(left: float) -> float:
 def _is_too_large(dual: Dual, lattice: Lattice) -> bool:
     """Whether the next level of a dual is beyond what memory, checker or digits of an angle allow."""
     tables = int(table_sizes(lattice, dual.quads).sum())
-    many = int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
     counts, grid = np.stack([lattice.alpha_count, lattice.beta_count], axis=1), lattice.instance.grid
     stored = int(lattice.allowed_count[np.minimum(grid.first, grid.second)].sum())
-    many = many or counts.max() > MOST_COUNT or level_memory(counts, 0, 0) > memory_for(stored, _OF_SHARE)
-    return many or lattice.h < np.pi / 2 / _FINEST
+    return bool(
+        int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
+        or counts.max() > MOST_COUNT
+        or level_memory(counts, 0, 0) > memory_for(stored, _OF_SHARE)
+        or lattice.h < np.pi / 2 / _FINEST
+    )
 
 
 def _centre_at(field: CrossField) -> CrossField:
