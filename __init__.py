@@ -33,12 +33,12 @@ if TYPE_CHECKING:
     from .export.pictures.draw import draw as draw
     from .export.pictures.draw import preview as preview
     from .export.pictures.mask import write_mask as write_mask
+    from .export.runs.report import Report as Report
+    from .export.runs.run import run as run
     from .export.shading.colours import Light as Light
     from .export.solutions.solution import Solution as Solution
     from .export.solutions.solution import read_solution as read_solution
     from .export.solving.local import solve as solve
-    from .export.solving.report import Report as Report
-    from .export.solving.run import run as run
     from .export.surfaces.files import write_surface as write_surface
     from .models.errors import CrossfieldError as CrossfieldError
     from .models.errors import DomainError as DomainError
@@ -108,7 +108,7 @@ _HOME: Final = {
     "Problem": ".models.formulations.problem",
     "ProblemArrays": ".models.formulations.arrays",
     "Proof": ".models.proof.record",
-    "Report": ".export.solving.report",
+    "Report": ".export.runs.report",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",
     "SolutionError": ".models.errors",
@@ -136,7 +136,7 @@ _HOME: Final = {
     "read_mesh": ".models.mesh.read",
     "read_sketch": ".models.sketch.read",
     "read_solution": ".export.solutions.solution",
-    "run": ".export.solving.run",
+    "run": ".export.runs.run",
     "sample": ".models.sketch.samples",
     "samples": ".models.sketch.samples",
     "search": ".models.search.search",

@@ -27,7 +27,7 @@ from typing import Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.solving.methods import METHODS, Request
+from crossfield.export.runs.methods import METHODS, Request
 from crossfield.models.errors import CrossfieldError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import STROKE_WEIGHT, Instance

@@ -23,7 +23,7 @@ ORDER: Final = (
     "export/writing", "export/formats", "export", "export/solutions/readers",
     "export/solutions",
     "export/bundle", "export/shading", "export/pictures", "export/surfaces", "export/programs",
-    "export/solving", "export/verify", "export/studio",
+    "export/solving", "export/verify", "export/runs", "export/studio",
     "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
     "export/library/building", "export/library/contributions",
     "export/cli",

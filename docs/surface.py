@@ -22,7 +22,7 @@ from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
-from crossfield.export.solving.methods import METHODS, Request
+from crossfield.export.runs.methods import METHODS, Request
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
 from crossfield.models.sketch.samples import SAMPLES

@@ -12,7 +12,7 @@ from typing import Any, Final
 import crossfield as cf
 import numpy as np
 from crossfield.export.formats.registry import program_version
-from crossfield.export.solving.methods import METHODS, Request
+from crossfield.export.runs.methods import METHODS, Request
 from crossfield.models.errors import CrossfieldError
 from crossfield.models.field.field import CrossField, field_in_windows
 from crossfield.models.instance.instance import Instance

@@ -104,7 +104,7 @@ def run_command(
     report.json contains all facts. Ctrl-C ends the run with the fields so far; a second Ctrl-C ends it now.
     """
     from ...models.processes.limits import Limits
-    from ..solving.run import plan_sentence, run
+    from ..runs.run import plan_sentence, run
 
     limits = Limits(time_limit, threads=threads)
     with show_progress(quiet=printing.quiet) as show:

@@ -25,7 +25,7 @@ NAMES: Final = {
     ),
     "formats": _names_in("..formats.registry", "FORMATS"),
     "default formats": _names_in("..formats.registry", "DEFAULTS"),
-    "methods": _names_in("..solving.methods", "METHODS"),
+    "methods": _names_in("..runs.methods", "METHODS"),
     "bundled solvers": _names_in("..solvers_table", "BUNDLED"),
     "all solvers": _names_in("..solvers_table", "SOLVERS"),
     "programs": _names_in("..solvers_table", "PROGRAMS"),

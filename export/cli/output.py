@@ -25,7 +25,7 @@ from ...models.processes.deadline import Progress, silent
 if TYPE_CHECKING:
     from ...models.instance.instance import Instance
     from ...models.surface.surface import Surface
-    from ..solving.report import Report
+    from ..runs.report import Report
 
 WIDTH: Final = 80
 """Columns of the tables where the output is no terminal."""
@@ -179,7 +179,7 @@ _LEGEND: Final = """\
 
 def show_report(report: Report, folder: Path) -> None:
     """Print the fields and files of a run, and which methods failed."""
-    from ..solving.methods import table_cells
+    from ..runs.methods import table_cells
 
     gap = ("gap",) if report.proven else ()  # the bound is the same for all
     columns = ("method", "2-norm", *gap, "1-norm", "off", "<45°", "sing.", "s", "status")

@@ -110,7 +110,7 @@ def _write_proof(
 ) -> tuple[dict[str, Any], CrossfieldError | None]:
     """Write field, certificate and report of a proof; return the report, and why there is no certificate."""
     from ...models.field.file import write_field
-    from ..solving.proven import certify
+    from ..runs.proven import certify
 
     write_field(proof.field, folder / names.field)
     certificate, failure = None, None

@@ -16,8 +16,8 @@ from .output import print_notice, show_progress
 from .sketch_options import Size, SketchOptions
 
 if TYPE_CHECKING:
+    from ..runs.methods import Candidate, Request
     from ..solutions.solution import Solution
-    from ..solving.methods import Candidate, Request
 
 
 def solve_command(
@@ -42,7 +42,7 @@ def solve_command(
     """
     deadline = Deadline.after(time_limit)  # the time to load libraries counts
     from ...models.processes.limits import Limits
-    from ..solving.methods import Request
+    from ..runs.methods import Request
 
     if (formulation is None) == (method is None):
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
@@ -79,7 +79,7 @@ def solve_command(
 def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
     """Raise an error for an unknown method, or for an option of formulations."""
     from ...models.formulations.catalogue import FORMULATIONS, short_names
-    from ..solving.methods import METHODS
+    from ..runs.methods import METHODS
 
     if name not in METHODS and name in {*FORMULATIONS, *short_names()}:
         raise typer.BadParameter(f"{name} is a formulation, not a method; write -f {name}")
@@ -104,7 +104,7 @@ def _solve_by_method(name: str, request: Request, placing: _Placing) -> tuple[Ca
     from ...models.field.file import write_field
     from ...models.storage import replace_results
     from ..bundle.earlier import keep_better_field
-    from ..solving.methods import find_method
+    from ..runs.methods import find_method
 
     instance, folder = request.instance, request.folder
     method = find_method(name, instance)

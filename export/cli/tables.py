@@ -9,10 +9,10 @@ from ...models.formulations.catalogue import FORMULATIONS, declare
 from ...models.formulations.problem import Problem
 from ...models.sketch.samples import samples
 from ..formats.registry import FORMATS, problem_in_format
+from ..runs.methods import METHODS
 from ..solutions.readers.registry import READERS
 from ..solvers_table import BUNDLED, PROGRAMS, smallest_problem, suitabilities
 from ..solving.local import choose_format
-from ..solving.methods import METHODS
 
 Row = dict[str, Any]
 

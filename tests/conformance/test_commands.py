@@ -5,7 +5,7 @@ import itertools
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import app, invoke
-from crossfield.export.solving.methods import METHODS
+from crossfield.export.runs.methods import METHODS
 from instance_kinds import SMALL, crossed, kind, on_mesh
 from typer.main import get_command
 

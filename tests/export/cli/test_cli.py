@@ -17,8 +17,8 @@ from cases import SKEWED
 from children import complaints as without_progress
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
+from crossfield.export.runs.methods import METHODS
 from crossfield.export.solvers_table import BUNDLED
-from crossfield.export.solving.methods import METHODS
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.sketch.samples import SAMPLES
 from folders import contents

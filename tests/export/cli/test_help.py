@@ -12,8 +12,8 @@ from crossfield.export.cli.help_texts import Command
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.library.plan.spec import RUNGS
 from crossfield.export.pictures.draw import KINDS
+from crossfield.export.runs.methods import METHODS
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS
-from crossfield.export.solving.methods import METHODS
 from crossfield.models.formulations.catalogue import FORMULATIONS, short_names
 from crossfield.models.sketch.read import DEFAULT_SIZE
 from crossfield.models.sketch.samples import SAMPLES

@@ -10,7 +10,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.pictures.draw import draw
 from crossfield.export.pictures.underlay import INK, read_underlay
-from crossfield.export.solving.run import run
+from crossfield.export.runs.run import run
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import write_field
 from crossfield.models.instance.file import read_instance, write_instance

@@ -6,8 +6,8 @@ from pathlib import Path
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
+from crossfield.export.runs.methods import METHODS, Request
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
-from crossfield.export.solving.methods import METHODS, Request
 from crossfield.models.search.starts import first_field
 
 

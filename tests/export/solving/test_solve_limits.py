@@ -94,7 +94,7 @@ def test_a_time_limit_does_not_keep_highs_from_reading_a_file(tmp_path):
 
 
 def test_the_second_stage_keeps_a_part_of_the_time():
-    from crossfield.export.solving.methods import jumps_until
+    from crossfield.export.runs.methods import jumps_until
 
     now = [0.0]
     for seconds, kept in ((60, 12.0), (10, 2.0), (6, 2.0), (2, 1.0), (0.1, 0.05), (0, 0.0)):

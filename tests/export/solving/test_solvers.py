@@ -16,9 +16,9 @@ import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.tables import tables
+from crossfield.export.runs.methods import Request
 from crossfield.export.solvers_table import BUNDLED
 from crossfield.export.solving.local import choose_solver
-from crossfield.export.solving.methods import Request
 from crossfield.export.statuses import Status
 from crossfield.models.errors import (
     InputError,

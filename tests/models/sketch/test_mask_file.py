@@ -4,9 +4,9 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.methods import Candidate
-from crossfield.export.solving.report import Report
-from crossfield.export.solving.run import START
+from crossfield.export.runs.methods import Candidate
+from crossfield.export.runs.report import Report
+from crossfield.export.runs.run import START
 from crossfield.models.errors import InputError
 from crossfield.models.instance.symmetries import turned
 from crossfield.models.sketch.samples import sample_svg, samples

@@ -5,7 +5,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.solving.methods import METHODS, Request
+from crossfield.export.runs.methods import METHODS, Request
 from crossfield.models.instance.angles import HALF
 from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, bend_field, tremble
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field

@@ -7,7 +7,7 @@ import crossfield as cf
 import pytest
 from cases import make_instance
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.methods import METHODS, Request, find_method, methods_of
+from crossfield.export.runs.methods import METHODS, Request, find_method, methods_of
 from crossfield.models.errors import DomainError
 from meshes import box, on_edges, write_obj
 

@@ -38,9 +38,9 @@ from ..pictures.mask import has_mask, write_mask
 from ..pictures.underlay import Underlay, read_underlay
 from ..surfaces.files import NORMALS, SHADED, write_layers
 from .methods import METHODS, Candidate, Method, Request, methods_of
+from .page import PAGE, REPORT, write_page
 from .proven import ProvenBound
 from .report import KEPT, Report, Stopwatch
-from .run_page import PAGE, REPORT, write_page
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 OVERLAY: Final = ("overlay.svg", "overlay.png")

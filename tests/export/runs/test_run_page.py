@@ -12,7 +12,7 @@ from browsing import CONTRAST, find, served, show, sideways
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, Format
-from crossfield.export.solving import run
+from crossfield.export.runs import run
 
 pytestmark = pytest.mark.slow
 

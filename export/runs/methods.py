@@ -24,7 +24,7 @@ from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
 from ..solutions.solution import Solution
 from ..solvers_table import SOLVERS
-from .local import names_of_solve, solve
+from ..solving.local import names_of_solve, solve
 
 if TYPE_CHECKING:
     from ...models.proof.orthogonal_certificate import OrthogonalProof

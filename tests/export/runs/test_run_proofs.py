@@ -9,7 +9,7 @@ from dataclasses import replace
 import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.solving.proven import ProvenBound
+from crossfield.export.runs.proven import ProvenBound
 from crossfield.models.proof.certificate import read_certificate
 
 

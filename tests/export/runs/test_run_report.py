@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.output import show_report
-from crossfield.export.solving.methods import METHODS, Candidate
-from crossfield.export.solving.report import Report, Stopwatch
+from crossfield.export.runs.methods import METHODS, Candidate
+from crossfield.export.runs.report import Report, Stopwatch
 from crossfield.export.statuses import Status
 from crossfield.models.search.starts import first_field
 

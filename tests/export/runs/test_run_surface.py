@@ -7,9 +7,9 @@ import crossfield as cf
 import pytest
 from crossfield.export.cli.output import show_report
 from crossfield.export.pictures.underlay import read_underlay
-from crossfield.export.solving.methods import Candidate, Request
-from crossfield.export.solving.report import Report
-from crossfield.export.solving.run import OVERLAY, PICTURES, _Pictures, picture_name
+from crossfield.export.runs.methods import Candidate, Request
+from crossfield.export.runs.report import Report
+from crossfield.export.runs.run import OVERLAY, PICTURES, _Pictures, picture_name
 from crossfield.export.surfaces.files import write_layers
 from crossfield.models.processes.deadline import never, silent
 from folders import contents

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
+from crossfield.export.runs.methods import METHODS, Request
+from crossfield.export.runs.proven import certify
 from crossfield.export.solving.local import SolveFiles, Solvers
-from crossfield.export.solving.methods import METHODS, Request
-from crossfield.export.solving.proven import certify
 from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.processes.limits import Limits
