@@ -69,8 +69,8 @@ if TYPE_CHECKING:
     from .models.proof.certificate import Certificate as Certificate
     from .models.proof.certificate import read_certificate as read_certificate
     from .models.proof.certificate import write_certificate as write_certificate
+    from .models.proof.descent.record import Proof as Proof
     from .models.proof.prove import prove as prove
-    from .models.proof.record import Proof as Proof
     from .models.search.greedy import greedy_field as greedy_field
     from .models.search.improvement import improved_field as improved_field
     from .models.search.search import Search as Search
@@ -107,7 +107,7 @@ _HOME: Final = {
     "OutputError": ".models.errors",
     "Problem": ".models.formulations.problem",
     "ProblemArrays": ".models.formulations.arrays",
-    "Proof": ".models.proof.record",
+    "Proof": ".models.proof.descent.record",
     "Report": ".export.runs.report",
     "Search": ".models.search.search",
     "Solution": ".export.solutions.solution",

@@ -11,8 +11,8 @@ from crossfield.export.pictures.marks import STROKE
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.domain import Bools, Floats
 from crossfield.models.instance.grid import Grid
-from crossfield.models.proof.lattice import block_starts
-from crossfield.models.proof.record import LevelRecord, Proof
+from crossfield.models.proof.bound.lattice import block_starts
+from crossfield.models.proof.descent.record import LevelRecord, Proof
 from diagrams import STYLE
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure

@@ -31,9 +31,9 @@ import proof_pictures
 import proof_solvers
 from crossfield.export.solvers_table import SOLVERS
 from crossfield.models.processes.limits import Limits
-from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.descent import MOST_LABELS
+from crossfield.models.proof.checkers import check_certificate
+from crossfield.models.proof.descent.descent import MOST_LABELS
 from crossfield.models.proof.prove import prove
 from crossfield.models.sketch.samples import SAMPLES, sample
 from drawings import PROVERS, SUFFIXES, Sketch, drawings_of, optimum, run_command, sketches, tiny_instances

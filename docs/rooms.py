@@ -19,7 +19,8 @@ GROUND: Final = "models"
 ORDER: Final = (
     "models", "models/processes", "models/instance", "models/mesh", "models/sketch", "models/field",
     "models/smooth", "models/surface", "models/orthogonal", "models/formulations",
-    "models/search", "models/proof", "templates",
+    "models/search", "models/proof/checkers", "models/proof/bound", "models/proof/descent", "models/proof",
+    "templates",
     "export/writing", "export/formats", "export", "export/solutions/readers",
     "export/solutions",
     "export/bundle", "export/shading", "export/pictures", "export/surfaces", "export/programs",

@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from ...models.field.field import Norm as NormOfField
     from ...models.instance.instance import Instance
     from ...models.proof.certificate import Certificate
-    from ...models.proof.orthogonal_certificate import LevelFacts, OrthogonalProof
-    from ...models.proof.record import LevelRecord, Proof
+    from ...models.proof.descent.orthogonal_certificate import LevelFacts, OrthogonalProof
+    from ...models.proof.descent.record import LevelRecord, Proof
     from ...models.storage import NewResults
 
 NORMS: Final[dict[str, NormOfField]] = {"1": 1, "2": 2, "mixed": "mixed"}
@@ -144,7 +144,7 @@ def _keep_better(
 
     The report then has the energy of the one, and levels and bound of the other.
     """
-    from ...models.proof.check_certificate import gap_of, status_of
+    from ...models.proof.checkers.check_certificate import gap_of, status_of
     from ..bundle.earlier import keep_better_bound, keep_better_field
 
     instance, norm = proof.field.instance, proof.norm

@@ -27,8 +27,8 @@ from ..solvers_table import SOLVERS
 from ..solving.local import names_of_solve, solve
 
 if TYPE_CHECKING:
-    from ...models.proof.orthogonal_certificate import OrthogonalProof
-    from ...models.proof.record import Proof
+    from ...models.proof.descent.orthogonal_certificate import OrthogonalProof
+    from ...models.proof.descent.record import Proof
 
 _STARTING: Final = 0.5  # share of the seconds for the field from which solvers start
 _ANGLES: Final = 0.2  # share of the seconds for the second of two stages

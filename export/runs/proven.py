@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import SolverError
-from ...models.proof.check_certificate import gap_of, status_of
-from ...models.proof.orthogonal_certificate import OrthogonalProof
-from ...models.proof.record import Proof
+from ...models.proof.checkers.check_certificate import gap_of, status_of
+from ...models.proof.descent.orthogonal_certificate import OrthogonalProof
+from ...models.proof.descent.record import Proof
 
 if TYPE_CHECKING:
     from ...models.proof.certificate import Certificate

@@ -1,6 +1,6 @@
 """Certificates: the claims of a proof in a file that anyone can check without the code of the prover.
 
-models/proof/check_certificate.py reads what this module writes, in the same order and by the same names.
+checkers/check_certificate.py reads what this module writes, in the same order and by the same names.
 docs/files.md, "Layout of a certificate", describes the arrays. Equal proofs give equal bytes.
 """
 
@@ -26,10 +26,10 @@ from ..processes.process_groups import are_interrupts_caught
 from ..processes.process_pool import process_pool
 from ..storage import read_bytes, require_suffix, write_bytes
 from ..written_files import FORCE, check_targets, is_unchanged
-from . import check_certificate, check_orthogonal
-from .check_certificate import ProvenClaim
-from .orthogonal_certificate import OrthogonalProof
-from .record import Claim, LevelRecord, Proof
+from .checkers import check_certificate, check_orthogonal
+from .checkers.check_certificate import ProvenClaim
+from .descent.orthogonal_certificate import OrthogonalProof
+from .descent.record import Claim, LevelRecord, Proof
 
 REFUSALS: Final = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 """Errors of the checker for a proof that does not hold."""
@@ -275,7 +275,7 @@ def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels, *, h
 
     The prover's boxes are a little larger than the checker's, so its pieces cover these as a rule.
     """
-    from .last_step import fit_to_boxes, minimise_on_boxes  # loads solvers
+    from .descent.last_step import fit_to_boxes, minimise_on_boxes  # loads solvers
 
     terms, last, size = passed.terms, passed.last, 2 * (len(passed.terms.first) + len(passed.terms.white))
     if last is None or not has_pieces:

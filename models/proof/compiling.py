@@ -23,13 +23,13 @@ from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, Over, Progress, never, silent
 from ..search.greedy import greedy_field
 from ..sketch.samples import sample
-from . import orthogonal_dual
-from .descent import Termination
-from .dual import Dual
-from .lattice import Lattice
-from .orthogonal import prove_orthogonal
-from .pruning import finer_lattice
-from .rounding import decode
+from .bound import orthogonal_dual
+from .bound.dual import Dual
+from .bound.lattice import Lattice
+from .bound.pruning import finer_lattice
+from .bound.rounding import decode
+from .descent.descent import Termination
+from .descent.orthogonal import prove_orthogonal
 
 
 @contextmanager

@@ -20,14 +20,14 @@ from ..processes.limits import Limits
 from ..processes.process_groups import are_interrupts_caught, catch_interrupts
 from ..search.stroked_parts import extended, restricted, stroked_parts
 from ..smooth.sparse_systems import one_thread
-from .absolute_descent import AbsoluteDescent
 from .certificate import REFUSALS, check_proof
 from .compiling import compile_proofs
-from .descent import Descent, Termination
-from .orthogonal import prove_orthogonal
-from .orthogonal_certificate import OrthogonalProof
-from .orthogonal_certificate import check_proof as check_orthogonal_proof
-from .record import Proof
+from .descent.absolute_descent import AbsoluteDescent
+from .descent.descent import Descent, Termination
+from .descent.orthogonal import prove_orthogonal
+from .descent.orthogonal_certificate import OrthogonalProof
+from .descent.orthogonal_certificate import check_proof as check_orthogonal_proof
+from .descent.record import Proof
 
 _AnyProof = TypeVar("_AnyProof", Proof, OrthogonalProof)
 

@@ -10,7 +10,7 @@ from ..instance.angles import HALF, QUARTER
 from ..instance.domain import Bools
 from ..instance.terms import parity_sign
 from .certificate import Certificate
-from .check_certificate import ProvenBoxes
+from .checkers.check_certificate import ProvenBoxes
 
 _MARGIN = 1e-9  # radians by which windows are wider than the boxes, to allow for rounding in solvers
 

@@ -6,7 +6,7 @@ import numpy as np
 from crossfield.models.instance.file import instance_arrays
 from crossfield.models.instance.instance import Instance
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, field_of
-from crossfield.models.proof import check_orthogonal as checker
+from crossfield.models.proof.checkers import check_orthogonal as checker
 
 UNIT = 2.0**-30
 

@@ -1,12 +1,12 @@
 """Proofs round a given field, which need not be a good one: `prove` would search for a better one."""
 
 from crossfield.models.processes.compilation import crew
-from crossfield.models.proof.check_certificate import has_forced_jump
-from crossfield.models.proof.dual import Dual
-from crossfield.models.proof.last_step import energy_terms, last_step_on
-from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.pruning import finer_lattice
-from crossfield.models.proof.record import LevelRecord, Proof
+from crossfield.models.proof.bound.dual import Dual
+from crossfield.models.proof.bound.lattice import Lattice
+from crossfield.models.proof.bound.pruning import finer_lattice
+from crossfield.models.proof.checkers.check_certificate import has_forced_jump
+from crossfield.models.proof.descent.last_step import energy_terms, last_step_on
+from crossfield.models.proof.descent.record import LevelRecord, Proof
 
 
 def prove_round(field, levels, steps=8):

@@ -19,7 +19,7 @@ from ....models.formulations.problem import Problem, formulate, with_integers_fi
 from ....models.instance.angles import HALF
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import write_certificate
-from ....models.proof.record import Proof
+from ....models.proof.descent.record import Proof
 from ....models.search.angle_program import alternate_absolute
 from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
-from ....models.proof import check_certificate, check_orthogonal
+from ....models.proof.checkers import check_certificate, check_orthogonal
 from ....models.storage import read_bytes, write_bytes
 from ....models.written_files import is_unchanged
 from ....templates import ENVIRONMENT

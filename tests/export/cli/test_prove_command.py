@@ -10,7 +10,7 @@ import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.array_archive import pack_arrays
 from crossfield.models.field.file import read_field
-from crossfield.models.proof import check_certificate
+from crossfield.models.proof.checkers import check_certificate
 from folders import contents
 
 

@@ -8,12 +8,12 @@ import pytest
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.compilation import crew
-from crossfield.models.proof import check_certificate
+from crossfield.models.proof.bound.dual import Dual
+from crossfield.models.proof.bound.lattice import Lattice
 from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.proof.check_certificate import has_forced_jump
-from crossfield.models.proof.dual import Dual
-from crossfield.models.proof.last_step import energy_terms
-from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.checkers import check_certificate
+from crossfield.models.proof.checkers.check_certificate import has_forced_jump
+from crossfield.models.proof.descent.last_step import energy_terms
 from crossfield.models.search.angle_program import Residuals, fit_absolute, solve_angle_program
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.compilation import crew
-from crossfield.models.proof.dual import Dual
-from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.bound.dual import Dual
+from crossfield.models.proof.bound.lattice import Lattice
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from labellings import discrete, least_labelling

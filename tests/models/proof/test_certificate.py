@@ -24,9 +24,9 @@ from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import free_jumps
 from crossfield.models.processes.process_pool import parallel_map
-from crossfield.models.proof import check_certificate
 from crossfield.models.proof.certificate import read_certificate, write_certificate
-from crossfield.models.proof.last_step import minimise_on_boxes
+from crossfield.models.proof.checkers import check_certificate
+from crossfield.models.proof.descent.last_step import minimise_on_boxes
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.tightening import remaining_windows
 from exhaustive import optimum, random_instance, sketch

@@ -9,8 +9,8 @@ import pytest
 from crossfield.models.array_archive import pack_arrays
 from crossfield.models.errors import InputError
 from crossfield.models.instance.instance import Instance
-from crossfield.models.proof import check_certificate, check_orthogonal
 from crossfield.models.proof.certificate import read_certificate, write_certificate
+from crossfield.models.proof.checkers import check_certificate, check_orthogonal
 from exhaustive import optimum, random_instance, sketch
 from orthogonal_certificates import certificate_at
 from proofs_round_fields import prove_round

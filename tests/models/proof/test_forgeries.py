@@ -15,9 +15,9 @@ from archives import forged, members_of, npy, packed
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.file import instance_of_arrays
-from crossfield.models.proof import check_certificate
+from crossfield.models.proof.bound.clusters import zero_clusters
 from crossfield.models.proof.certificate import read_certificate, write_certificate
-from crossfield.models.proof.clusters import zero_clusters
+from crossfield.models.proof.checkers import check_certificate
 from crossfield.models.proof.prove import prove
 from crossfield.models.search.angle_program import alternate_absolute
 from exhaustive import optimum, random_instance

@@ -3,8 +3,8 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.proof import descent
 from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.descent import descent
 
 pytestmark = pytest.mark.numeric
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import HALF, QUARTER
-from crossfield.models.proof.lattice import Lattice
+from crossfield.models.proof.bound.lattice import Lattice
 from exhaustive import random_instance
 
 pytestmark = pytest.mark.numeric

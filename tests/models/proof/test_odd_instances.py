@@ -6,7 +6,7 @@ The optimum of the smallest is found without the prover: by trying every jump, o
 
 import crossfield as cf
 import pytest
-from crossfield.models.proof import check_certificate
+from crossfield.models.proof.checkers import check_certificate
 from exhaustive import least_absolute, least_squares
 from odd_instances import NORMS, odd_instance
 

@@ -7,8 +7,8 @@ import pytest
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.mesh import Mesh
 from crossfield.models.orthogonal.energy import OrthogonalEnergy
-from crossfield.models.proof import check_orthogonal as checker
-from crossfield.models.proof.check_certificate import NotProvenError, UnreadableError
+from crossfield.models.proof.checkers import check_orthogonal as checker
+from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError
 from orthogonal_certificates import certificate_at, shares_of_star, star, with_head
 from small_meshes import try_all_integers
 

@@ -5,11 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from crossfield.models.processes.compilation import crew
-from crossfield.models.proof.clusters import zero_clusters
-from crossfield.models.proof.dual import Dual
-from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.min_plus import RaggedMatrix, fill_product_over_beta, least_beta_cost, min_plus
-from crossfield.models.proof.passes import fill_product, pair_minimum, shares_at
+from crossfield.models.proof.bound.clusters import zero_clusters
+from crossfield.models.proof.bound.dual import Dual
+from crossfield.models.proof.bound.lattice import Lattice
+from crossfield.models.proof.bound.min_plus import (
+    RaggedMatrix,
+    fill_product_over_beta,
+    least_beta_cost,
+    min_plus,
+)
+from crossfield.models.proof.bound.passes import fill_product, pair_minimum, shares_at
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 from labellings import discrete

@@ -19,7 +19,8 @@ from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.symmetries import mirrored, transposed, turned
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.proof import check_certificate, orthogonal
+from crossfield.models.proof.checkers import check_certificate
+from crossfield.models.proof.descent import orthogonal
 from exhaustive import exact, optimum, random_instance, sketch
 from small_drawings import read, svg
 

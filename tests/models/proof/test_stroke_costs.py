@@ -4,11 +4,11 @@ import crossfield as cf
 import numpy as np
 from crossfield.models.field.field import CrossField
 from crossfield.models.processes.compilation import crew
-from crossfield.models.proof import check_certificate
+from crossfield.models.proof.bound.dual import Dual
+from crossfield.models.proof.bound.lattice import Lattice
 from crossfield.models.proof.certificate import _head_arrays, _proof_arrays
-from crossfield.models.proof.dual import Dual
-from crossfield.models.proof.lattice import Lattice
-from crossfield.models.proof.record import LevelRecord, Proof
+from crossfield.models.proof.checkers import check_certificate
+from crossfield.models.proof.descent.record import LevelRecord, Proof
 
 
 def test_a_centre_whose_other_line_carries_the_stroke_has_a_certificate(tmp_path):

@@ -3,7 +3,7 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.proof.descent import Descent
+from crossfield.models.proof.descent.descent import Descent
 from crossfield.models.search import starts
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.improvement import improved_field

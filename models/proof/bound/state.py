@@ -7,8 +7,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.domain import Floats
-from ..instance.grid import Grid
+from ...instance.domain import Floats
+from ...instance.grid import Grid
 from .lattice import Lattice, Starts
 from .pruning import allowed_rows
 
@@ -37,7 +37,7 @@ RowEnds = tuple[Indices, Indices]
 
 
 class Clusters(NamedTuple):
-    """Tables on pairs of alphas, four for each quad; see models/proof/clusters.py."""
+    """Tables on pairs of alphas, four for each quad; see models/proof/bound/clusters.py."""
 
     quads: Indices  # (q, 4): the pairs of each quad, as in `Grid.quads`
     start: (

@@ -22,13 +22,13 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..field.field import AbsoluteNorm, CrossField, Norm
-from ..field.jumps import step_labels
-from ..instance.angles import HALF, QUARTER, wrap
-from ..instance.domain import Bools, Floats, Ints
-from ..instance.grid import Grid
-from ..instance.instance import Instance
-from ..smooth.sparse_systems import stroke_weight
+from ...field.field import AbsoluteNorm, CrossField, Norm
+from ...field.jumps import step_labels
+from ...instance.angles import HALF, QUARTER, wrap
+from ...instance.domain import Bools, Floats, Ints
+from ...instance.grid import Grid
+from ...instance.instance import Instance
+from ...smooth.sparse_systems import stroke_weight
 
 Starts = NDArray[np.int64]  # places in flat arrays, as of the starts of blocks and the end of the last one
 

@@ -1,7 +1,7 @@
 """The compiled code for one pixel and one pair: (min,+) products of labels with a pair's cost.
 
 For one parity of the jump the cost 2 (A^2 + B^2) is a sum of a term in alpha and one in beta. So the
-product is one over beta (models/proof/min_plus.py) and then one over alpha: O(N^3) for N^2 labels. A^2 is
+product is one over beta (min_plus.py) and then one over alpha: O(N^3) for N^2 labels. A^2 is
 the least over all jumps of that parity: A is taken modulo pi.
 
 The first call compiles for some 12 s of CPU; cached code loads in 0.3 s.
@@ -13,8 +13,8 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
-from ..instance.domain import Floats
-from ..processes.compilation import compiled, compiled_inside, inlined
+from ...instance.domain import Floats
+from ...processes.compilation import compiled, compiled_inside, inlined
 from .min_plus import (
     RaggedMatrix,
     RightMatrix,

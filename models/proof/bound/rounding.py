@@ -11,15 +11,15 @@ from typing import Final
 
 import numpy as np
 
-from ..field.field import CrossField, field_in_windows
-from ..field.jumps import free_jumps
-from ..instance.angles import QUARTER
-from ..instance.domain import Bools, Floats
-from ..processes.compilation import compiled, inlined
-from ..processes.deadline import Over, never
-from ..search.box_qp import FreeField
-from ..search.energy import LinearSolver
-from ..search.improvement import improved_field, settle
+from ...field.field import CrossField, field_in_windows
+from ...field.jumps import free_jumps
+from ...instance.angles import QUARTER
+from ...instance.domain import Bools, Floats
+from ...processes.compilation import compiled, inlined
+from ...processes.deadline import Over, never
+from ...search.box_qp import FreeField
+from ...search.energy import LinearSolver
+from ...search.improvement import improved_field, settle
 from .dual import Dual
 from .passes import add_to, least_a, shares_at, size_of
 from .state import Indices, State

@@ -13,10 +13,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..array_archive import Arrays
-from ..instance.domain import Bools, Floats
-from ..processes.compilation import compiled, compiled_in_any_order, compiled_inside
-from .check_orthogonal import STRIDE, CellLevel, spans, starts_of
+from ...array_archive import Arrays
+from ...instance.domain import Bools, Floats
+from ...processes.compilation import compiled, compiled_in_any_order, compiled_inside
+from ..checkers.check_orthogonal import STRIDE, CellLevel, spans, starts_of
 
 Indices = NDArray[np.int64]
 

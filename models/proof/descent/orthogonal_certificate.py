@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..array_archive import Arrays, pack_arrays
-from ..field.field import Norm
-from ..instance.domain import Floats
-from . import check_orthogonal as checker
-from .check_certificate import ProvenClaim, memory_for
+from ...array_archive import Arrays, pack_arrays
+from ...field.field import Norm
+from ...instance.domain import Floats
+from ..checkers import check_orthogonal as checker
+from ..checkers.check_certificate import ProvenClaim, memory_for
 from .record import Claim
 
 

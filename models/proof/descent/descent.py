@@ -1,8 +1,8 @@
 """The descent of a proof: lattice after lattice, until no better field is left round the best one.
 
 Each refinement level has half the spacing of the one before, or the same spacing with fewer labels. On a
-level the dual rises by passes (models/proof/dual.py), fields are rounded from it (rounding.py), and cells
-that cannot hold a better field are dropped (pruning.py), until so few jumps are open that branching among
+level the dual rises by passes (bound/dual.py), fields are rounded from it (bound/rounding.py), and cells that
+cannot hold a better field are dropped (bound/pruning.py), until so few jumps are open that branching among
 them proves the optimum (last_step.py). A better field that is found on a coarse lattice becomes the centre:
 the levels begin anew round it. On a finer lattice little is lost where the centre is another field.
 
@@ -23,24 +23,24 @@ from typing import Final
 
 import numpy as np
 
-from ..array_archive import Arrays
-from ..field.field import CrossField, Norm, field_in_windows
-from ..field.jumps import free_jumps
-from ..instance.instance import Instance
-from ..processes.compilation import Crew
-from ..processes.deadline import Deadline, Over, Progress, never
-from ..processes.limits import Limits
-from ..search.improvement import improved_field
-from ..search.search import search
-from ..search.starts import polyvector_start, start_fields
-from .check_certificate import MOST_COUNT, has_forced_jump, level_memory, memory_for
-from .clusters import table_sizes
-from .dual import Dual
+from ...array_archive import Arrays
+from ...field.field import CrossField, Norm, field_in_windows
+from ...field.jumps import free_jumps
+from ...instance.instance import Instance
+from ...processes.compilation import Crew
+from ...processes.deadline import Deadline, Over, Progress, never
+from ...processes.limits import Limits
+from ...search.improvement import improved_field
+from ...search.search import search
+from ...search.starts import polyvector_start, start_fields
+from ..bound.clusters import table_sizes
+from ..bound.dual import Dual
+from ..bound.lattice import Lattice
+from ..bound.pruning import RemainingCells, finer_lattice, smaller_lattice
+from ..bound.rounding import Rounding, better_field
+from ..checkers.check_certificate import MOST_COUNT, has_forced_jump, level_memory, memory_for
 from .last_step import energy_terms, has_few_open, last_step_on, minimise_on_boxes
-from .lattice import Lattice
-from .pruning import RemainingCells, finer_lattice, smaller_lattice
 from .record import EXACT, LevelRecord, Proof
-from .rounding import Rounding, better_field
 
 # Levels
 COARSEST: Final = 16  # steps in pi/2 of the first level, whose passes cost least

@@ -3,7 +3,7 @@
 Labels are excluded by lower bounds of their min-marginals, the least energy with one label fixed. A pixel's
 box is the bounding box of the cells that are left, as in branch and bound.
 
-1. After a forward pass (models/proof/dual.py), label x of pixel i survives where `bound` + theta_i(x) - min
+1. After a forward pass (dual.py), label x of pixel i survives where `bound` + theta_i(x) - min
    theta_i <= U + tolerance, and in two further tests where `bound` + the excess of a comb (combs.py) is.
    Section 5 of docs/proofs.md proves the tests.
 2. A cell (k, l), (k + 1, l + 1) is left where its four vertices are allowed and in each test one of them
@@ -24,9 +24,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..instance.angles import QUARTER
-from ..instance.domain import Bools, Floats, Ints
-from ..processes.compilation import compiled, inlined
+from ...instance.angles import QUARTER
+from ...instance.domain import Bools, Floats, Ints
+from ...processes.compilation import compiled, inlined
 from .lattice import Lattice, Starts, beta_range, block_starts, ranges
 
 

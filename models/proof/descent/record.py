@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Final, Literal, Self, cast
 
-from ..array_archive import Arrays
-from ..field.field import CrossField, Norm
-from .check_certificate import ProvenClaim, gap_of, status_of
-from .lattice import Lattice
+from ...array_archive import Arrays
+from ...field.field import CrossField, Norm
+from ..bound.lattice import Lattice
+from ..checkers.check_certificate import ProvenClaim, gap_of, status_of
 
 if TYPE_CHECKING:
-    from .dual import Dual
+    from ..bound.dual import Dual
 
 Status = Literal["optimal", "gap"]
 
@@ -41,10 +41,10 @@ class Claim:
 class LevelRecord(Lattice):
     """One level of a proof: its lattice and a dual solution on it.
 
-    shares, tables: the arrays of shares and quads of a certificate (models/proof/encoding.py). bound: sum
+    shares, tables: the arrays of shares and quads of a certificate (bound/encoding.py). bound: sum
     over pixels of min (D + shares) + sum over pairs of min (c + tables - shares) + sum over clusters of min
     (- tables), over allowed labels, minus a bound of its rounding error. energy: U when the level was pruned;
-    fields outside the next level have more (models/proof/pruning.py).
+    fields outside the next level have more (models/proof/bound/pruning.py).
     """
 
     shares: Arrays

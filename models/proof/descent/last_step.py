@@ -15,16 +15,17 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
-from ..array_archive import Arrays
-from ..field.field import CrossField, Norm
-from ..instance.angles import HALF, QUARTER
-from ..instance.domain import Bools, Floats
-from ..instance.instance import Instance
-from ..processes.deadline import Over, never
-from ..search.angle_program import solve_angle_program
-from ..search.box_qp import field_at
-from ..smooth.sparse_systems import stroke_weight
-from .check_certificate import (
+from ...array_archive import Arrays
+from ...field.field import CrossField, Norm
+from ...instance.angles import HALF, QUARTER
+from ...instance.domain import Bools, Floats
+from ...instance.instance import Instance
+from ...processes.deadline import Over, never
+from ...search.angle_program import solve_angle_program
+from ...search.box_qp import field_at
+from ...smooth.sparse_systems import stroke_weight
+from ..bound.pruning import RemainingCells
+from ..checkers.check_certificate import (
     BoxPiece,
     EnergyTerms,
     LastStep,
@@ -33,7 +34,6 @@ from .check_certificate import (
     linear_bound,
     pieces_of,
 )
-from .pruning import RemainingCells
 from .record import EXACT
 
 _MOST_NODES: Final = 390  # of the tree of pieces

@@ -17,21 +17,21 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-from ..array_archive import Arrays
-from ..field.field import CrossField
-from ..instance.cycles import grow_forest
-from ..instance.domain import Bools, Domain, Floats, Ints
-from ..instance.file import instance_arrays
-from ..instance.instance import Instance
-from ..orthogonal.energy import OrthogonalEnergy, field_of
-from ..orthogonal.search import IntegerSearch
-from ..processes.deadline import Progress
-from ..search.integer_fields import starting_integers
-from . import check_orthogonal as checker
-from .check_certificate import OPTIMAL
-from .check_orthogonal import CellLevel, CentredRows
+from ...array_archive import Arrays
+from ...field.field import CrossField
+from ...instance.cycles import grow_forest
+from ...instance.domain import Bools, Domain, Floats, Ints
+from ...instance.file import instance_arrays
+from ...instance.instance import Instance
+from ...orthogonal.energy import OrthogonalEnergy, field_of
+from ...orthogonal.search import IntegerSearch
+from ...processes.deadline import Progress
+from ...search.integer_fields import starting_integers
+from ..bound.orthogonal_dual import RingDual, update_rings
+from ..checkers import check_orthogonal as checker
+from ..checkers.check_certificate import OPTIMAL
+from ..checkers.check_orthogonal import CellLevel, CentredRows
 from .orthogonal_certificate import LevelFacts, OrthogonalProof
-from .orthogonal_dual import RingDual, update_rings
 
 if TYPE_CHECKING:
     from .descent import Termination

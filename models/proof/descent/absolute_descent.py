@@ -1,6 +1,6 @@
 """The descent of a proof where pairs count with absolute values: in the 1-norm and in the mixed norm.
 
-It is that of models/proof/descent.py, on a lattice common to all pixels. Once the boxes of a level leave no
+It is that of descent.py, on a lattice common to all pixels. Once the boxes of a level leave no
 choice of jumps, a linear or quadratic program gives the energy on them, except for strokes at the edges of
 their windows, where boxes are cut. Its multipliers prove its least value. Section 9 of docs/proofs.md states
 and proves the lemmas.
@@ -10,14 +10,14 @@ from __future__ import annotations
 
 from typing import cast
 
-from ..field.field import AbsoluteNorm, CrossField, Norm
-from ..field.jumps import best_jumps
-from ..instance.instance import Instance
-from ..processes.deadline import Over, never
-from ..search.angle_program import alternate_absolute, fit_absolute
+from ...field.field import AbsoluteNorm, CrossField, Norm
+from ...field.jumps import best_jumps
+from ...instance.instance import Instance
+from ...processes.deadline import Over, never
+from ...search.angle_program import alternate_absolute, fit_absolute
+from ..bound.dual import Dual
+from ..bound.lattice import Lattice
 from .descent import COARSEST, Descent
-from .dual import Dual
-from .lattice import Lattice
 
 
 class AbsoluteDescent(Descent):

@@ -11,7 +11,7 @@ and passes gamma (theta_i - min theta_i) to its pairs to later pixels, with gamm
 of pairs to earlier or to later pixels. A backward pass does the same with earlier and later exchanged. After
 a pass min (c - shares) is 0 at every pair, and the bound, the sum of min theta_i, has not fallen.
 
-The compiled code for one pixel and one pair is models/proof/passes.py.
+The compiled code for one pixel and one pair is passes.py.
 """
 
 from __future__ import annotations
@@ -22,14 +22,14 @@ from typing import Final
 
 import numpy as np
 
-from ..array_archive import Arrays
-from ..field.field import CrossField
-from ..instance.domain import Bools, Floats
-from ..instance.grid import Grid
-from ..processes.compilation import Crew
-from ..processes.deadline import Over, never
-from ..smooth.sparse_systems import stroke_weight
-from . import check_certificate
+from ...array_archive import Arrays
+from ...field.field import CrossField
+from ...instance.domain import Bools, Floats
+from ...instance.grid import Grid
+from ...processes.compilation import Crew
+from ...processes.deadline import Over, never
+from ...smooth.sparse_systems import stroke_weight
+from ..checkers import check_certificate
 from .clusters import (
     copy_tables,
     independent_clusters,
@@ -233,7 +233,7 @@ class Dual:
     def _rounding_margins(self) -> tuple[float, float]:
         """Margin that the checker takes off the bound of a pass, and adds to the energy for combs.
 
-        It is more than this process rounds. See `ForwardPass` in models/proof/check_certificate.py.
+        It is more than this process rounds. See `ForwardPass` in models/proof/checkers/check_certificate.py.
         """
         lattice, (shares, costs) = self.lattice, self._greatest_sizes()
         instance, n, m = lattice.instance, len(lattice.count), len(lattice.p)
@@ -250,7 +250,7 @@ class Dual:
     def remaining_cells(self, bound: float, energy: float, *, combs: bool = True) -> RemainingCells:
         """The cells that the level leaves below an energy, by a forward pass and, if asked for, combs.
 
-        See models/proof/pruning.py.
+        See models/proof/bound/pruning.py.
         """
         self.forward()
         excess = self._excess(bound, energy)

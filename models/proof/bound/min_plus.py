@@ -12,8 +12,8 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.domain import Floats
-from ..processes.compilation import compiled, compiled_in_any_order, inlined
+from ...instance.domain import Floats
+from ...processes.compilation import compiled, compiled_in_any_order, inlined
 from .state import RowEnds, State
 
 _NEAR: Final = 1  # terms on both sides of the best one of a row that come before the others

@@ -15,8 +15,8 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.domain import Floats
-from ..processes.compilation import Crew
+from ...instance.domain import Floats
+from ...processes.compilation import Crew
 from .passes import COMB, fill_reparametrised, work_on
 from .state import State
 

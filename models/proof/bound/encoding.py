@@ -7,8 +7,8 @@ from typing import Final
 
 import numpy as np
 
-from ..array_archive import Arrays
-from ..instance.domain import Floats
+from ...array_archive import Arrays
+from ...instance.domain import Floats
 from .lattice import Lattice
 from .state import Clusters
 

@@ -29,9 +29,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ..instance.domain import Floats, Ints
-from ..instance.grid import Grid
-from ..processes.compilation import compiled, compiled_inside, inlined
+from ...instance.domain import Floats, Ints
+from ...instance.grid import Grid
+from ...processes.compilation import compiled, compiled_inside, inlined
 from .lattice import Lattice, block_starts
 from .min_plus import (
     RaggedMatrix,
