@@ -9,11 +9,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.documents import read_document
 from ...models.errors import CrossfieldError, FormulationError, InstanceError
 from ...models.formulations.problem import Problem, formulate, with_products_lifted, with_windows
 from ...models.formulations.windows import Windows
 from ...models.instance.domain import Ints
-from ...models.instance.file import read_document, read_instance, write_instance
+from ...models.instance.file import read_instance, write_instance
 from ...models.instance.instance import Instance
 from ...models.storage import write_bytes
 from ..formats.registry import Written, program_version

@@ -17,10 +17,10 @@ from typing import Any, Final, Literal, TypeVar, get_args
 
 import numpy as np
 
+from ...models.documents import parse_json
 from ...models.errors import InputError, InstanceError, NoStrokeError, shortened
 from ...models.input_limits import MAX_ELEMENTS, MAX_SEGMENTS
 from ...models.instance.domain import Bools, Floats, Ints
-from ...models.instance.file import parse_json
 from ...models.instance.instance import STROKE_WEIGHT, name_from_text
 from ...models.sketch.cover import Box
 from ...models.sketch.curves import Curves, lines_as_cubics

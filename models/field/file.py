@@ -15,22 +15,18 @@ from typing import Any, Final, TypeVar
 import numpy as np
 
 from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
+from ..documents import check_schema, check_version, decode_json, parse_head, parse_json
 from ..errors import CrossfieldError, InputError, InstanceError, OutputError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.angles import MOST_ANGLE
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.file import (
     are_places,
-    check_schema,
-    check_version,
-    decode_json,
     instance_arrays,
     instance_of_archive,
     instance_of_document,
     instance_to_json,
     number_table,
-    parse_head,
-    parse_json,
 )
 from ..instance.grid import Grid
 from ..instance.instance import Instance

@@ -7,19 +7,16 @@ and the weights of pairs are written only where they are not the default.
 from __future__ import annotations
 
 import json
-from collections import Counter
-from collections.abc import Callable, Mapping
-from functools import cache
-from importlib.resources import files
-from itertools import islice
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 
 from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
+from ..documents import check_schema, check_version, decode_json, parse_head, parse_json
 from ..errors import InstanceError, naming, shortened
-from ..input_limits import MAX_ARCHIVE, MAX_BYTES, MAX_GRID, MAX_HEAD
+from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, require_suffix, write_bytes
 from .domain import Floats
 from .grid import Grid
@@ -38,7 +35,6 @@ _SCALARS = {
     "orthogonal": "orthogonal",
 }
 """Attributes of an instance by the keys of a file; view and orthogonal only where they are chosen."""
-_MOST_ERRORS: Final = 100  # of a document; the outermost of them is reported
 _ARCHIVE: Final = {
     "head": ExpectedArray(1, MAX_HEAD, "u"),
     "theta": ExpectedArray(1, MAX_GRID**2),
@@ -164,61 +160,6 @@ def _head(instance: Instance) -> dict[str, Any]:
     return {"format": FORMAT, "version": VERSION} | scalars
 
 
-def decode_json(data: bytes) -> str:
-    """The text of a JSON file. Raises InstanceError for other content and for more than MAX_BYTES bytes."""
-    if len(data) > MAX_BYTES:
-        raise InstanceError(f"has {len(data)} bytes of JSON; at most {MAX_BYTES} are read, write it as .npz")
-    try:
-        return data.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise InstanceError("is neither JSON nor .npz; expected a file written by crossfield") from error
-
-
-def parse_json(text: str) -> object:
-    """Parse JSON text, with or without byte order mark. Raises InstanceError with the line."""
-    try:
-        return cast("object", json.loads(text.removeprefix("\ufeff"), object_pairs_hook=_unique_keys))
-    except (ValueError, RecursionError) as error:
-        raise InstanceError(f"is not valid JSON: {shortened(error)}") from error
-
-
-def _unique_keys(pairs: list[tuple[str, object]]) -> dict[str, object]:
-    """An object of a JSON document. Refuses repeated keys, because programs differ on which one counts."""
-    document = dict(pairs)
-    if len(document) < len(pairs):
-        ((name, _),) = Counter(name for name, _ in pairs).most_common(1)
-        raise ValueError(f"the key {shortened(name)!r} appears twice")
-    return document
-
-
-def read_document(
-    path: Path, form: str, version: int, schema: str, package: str, *, remedy: str
-) -> dict[str, Any]:
-    """Return the JSON document in a file, if it has this format and version and obeys the schema.
-
-    Raises InputError when the file cannot be read, and InstanceError with file and place.
-    """
-    try:
-        text = read_bytes(path, MAX_BYTES).decode()
-    except UnicodeDecodeError as error:
-        raise InstanceError(f"is not JSON; {remedy}", file=path) from error
-    with naming(path):
-        document = parse_json(text)
-        _check_writable(document)
-        check_version(document, form, version)
-        return check_schema(document, schema, package)
-
-
-def _check_writable(document: object) -> None:
-    """Raise InstanceError unless the document can be written as JSON in UTF-8 again."""
-    try:  # Python reads infinite numbers and halves of surrogate pairs, other programs need not
-        json.dumps(document, ensure_ascii=False, allow_nan=False).encode()
-    except UnicodeEncodeError as error:
-        raise InstanceError("has a text with half of a surrogate pair; write it again") from error
-    except ValueError as error:
-        raise InstanceError("has a number that is not finite; write it again") from error
-
-
 def instance_of_document(document: object) -> Instance:
     """Read an instance from a parsed JSON document. Raises InstanceError with the place in the document."""
     check_version(document, FORMAT, VERSION)
@@ -318,53 +259,6 @@ def number_table(rows: list[Any], width: int) -> Floats | None:
         return None
 
 
-def check_schema(
-    document: object, schema: str, package: str, rows: Mapping[str, Callable[[list[Any]], bool]] | None = None
-) -> dict[str, Any]:
-    """Return the document if it obeys the `<schema>.schema.json` of a package; else raise InstanceError.
-
-    rows: for keys with long lists, a fast test whether all entries obey the schema.
-    """
-    assert isinstance(document, dict)
-    quick = {
-        key: document[key][:1]
-        for key, are_good in (rows or {}).items()
-        if isinstance(document.get(key), list) and are_good(document[key])
-    }
-    error = schema_error({**document, **quick}, schema, package)
-    if error is not None:
-        raise InstanceError(f"{error.json_path}: {shortened(error.message, 200)}")
-    return cast("dict[str, Any]", document)
-
-
-def schema_error(document: dict[str, Any], schema: str, package: str) -> Any | None:
-    """The outermost jsonschema.ValidationError of a document, None when it obeys its schema."""
-    import jsonschema
-
-    lines = jsonschema.FormatChecker(formats=())
-    lines.checks("line")(lambda text: not isinstance(text, str) or text.isprintable())
-    validator = jsonschema.Draft202012Validator(_schema(schema, package), format_checker=lines)
-    first = islice(validator.iter_errors(document), _MOST_ERRORS)
-    return min(first, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
-
-
-@cache
-def _schema(name: str, package: str) -> dict[str, Any]:
-    text = files(package).joinpath(f"{name}.schema.json").read_text("utf-8")
-    return cast("dict[str, Any]", json.loads(text))
-
-
-def check_version(document: object, form: str, version: int) -> None:
-    """Raise InstanceError unless the document states this format and version."""
-    if not isinstance(document, dict) or document.get("format") != form:
-        raise InstanceError(f'is not a file of this kind: "format" must be "{form}"')
-    stated = document.get("version")
-    if stated != version or isinstance(stated, bool):
-        raise InstanceError(
-            f"has version {str(stated)[:20]}, but this program reads version {version}; write it again"
-        )
-
-
 def instance_arrays(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
     """The instance as named arrays; `head` is JSON text with format, version and scalars."""
     arrays: dict[str, np.ndarray[Any, Any]] = {
@@ -404,12 +298,3 @@ def instance_of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
         return Instance.on_pixels(origin=(x, y), pixel_size=head["pixel_size"], **more, **entries)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error
-
-
-def parse_head(arrays: dict[str, np.ndarray[Any, Any]]) -> dict[str, Any]:
-    """The parsed JSON text in the array `head`. Raises InstanceError."""
-    try:
-        head = parse_json(arrays["head"].tobytes().decode())
-    except (UnicodeDecodeError, InstanceError) as error:
-        raise InstanceError("its array 'head' is not JSON text") from error
-    return cast("dict[str, Any]", head)

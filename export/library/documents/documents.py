@@ -13,9 +13,10 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Final
 
+from ....models.documents import read_document
 from ....models.errors import CrossfieldError, InputError, InstanceError
 from ....models.formulations.problem import Problem, formulate, with_windows
-from ....models.instance.file import read_document, read_instance
+from ....models.instance.file import read_instance
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.proof.tightening import remaining_windows
 from ....models.storage import read_bytes

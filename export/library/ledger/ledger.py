@@ -14,10 +14,10 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Literal
 
+from ....models.documents import read_document, schema_error
 from ....models.errors import InputError, naming
 from ....models.field.field import CrossField, Norm
 from ....models.field.file import field_of_json, field_to_json
-from ....models.instance.file import read_document, schema_error
 from ....models.processes.process_groups import catch_interrupts
 from ....models.storage import read_bytes, write_bytes
 from .. import documents

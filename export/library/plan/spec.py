@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal, cast, get_args
 
+from ....models.documents import schema_error
 from ....models.errors import InputError, UnsupportedByFormatError, naming, shortened
 from ....models.formulations.catalogue import (
     AT_JUMPS,
@@ -25,7 +26,6 @@ from ....models.formulations.catalogue import (
 )
 from ....models.formulations.declaration import FACETS
 from ....models.input_limits import MAX_BYTES
-from ....models.instance.file import schema_error
 from ....models.instance.instance import GAUGES, Gauge
 from ....models.mesh.shapes import MESHES
 from ....models.sketch.drawing_file import suffix_of_picture
