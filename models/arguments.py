@@ -5,11 +5,12 @@ Other values of a wrong type fail where they are used, with Python's own errors.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Any
 
 import numpy as np
 
-from .errors import CrossfieldError, InputError, InstanceError
+from .errors import CrossfieldError, InputError, InstanceError, shortened
 
 _ErrorClass = type[CrossfieldError]
 
@@ -18,6 +19,18 @@ def check_flag(name: str, value: object, error: _ErrorClass = InputError) -> Non
     """Raise the error, which names the argument, unless it is True or False: a text such as "no" is true."""
     if not isinstance(value, (bool, np.bool_)):
         raise error(f"{name} is {value!r}; give True or False")
+
+
+def check_choice(
+    kind: str, value: object, known: Collection[str], error: _ErrorClass = InputError, *, place: str = ""
+) -> None:
+    """Raise the error, which lists the known names, unless the value is one of them.
+
+    kind: what is named, in singular. place: of the value in a file, before the message.
+    """
+    if not isinstance(value, str) or value not in known:
+        words = f"there is no {kind} {shortened(repr(value))}; choose one of {', '.join(known)}"
+        raise error(f"{place}: {words}" if place else words)
 
 
 def check_count(name: str, value: int, least: int = 0) -> None:

@@ -46,7 +46,7 @@ def _rank(answer: Solution | None) -> tuple[bool, float, bool]:
     """A key that sorts the best answer first."""
     if answer is None or answer.objective is None or answer.doubt:
         return True, 0.0, True
-    return False, float(f"{answer.objective:.9g}"), not str(answer.status).startswith("optimal")
+    return False, float(f"{answer.objective:.9g}"), not answer.status.is_optimal
 
 
 def _describe_answer(answer: Solution | None) -> str:

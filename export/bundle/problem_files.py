@@ -16,7 +16,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from ...models.arguments import check_flag
+from ...models.arguments import check_choice, check_flag
 from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import declaration_of, declare, list_formulations
@@ -195,8 +195,7 @@ def _check_formats(
 ) -> None:
     """Check the names of formats, and that one of them holds one of the formulations."""
     for name in (*formats, *dialects):
-        if name not in FORMATS:
-            raise InputError(f"there is no format {name!r}; choose one of {', '.join(FORMATS)}")
+        check_choice("format", name, FORMATS)
     reasons = []
     for problem in map(smallest_problem, formulations):
         for name in formats:

@@ -23,7 +23,8 @@ from typing import Final
 
 import numpy as np
 
-from ...models.errors import InputError, UnsupportedByFormatError, UnsupportedBySolverError
+from ...models.arguments import check_choice
+from ...models.errors import UnsupportedByFormatError, UnsupportedBySolverError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Floats
@@ -160,8 +161,7 @@ def write_start(problem: Problem, field: CrossField, path: str | Path, solver: s
     Raises InputError for a solver without a format of starts, and UnsupportedBySolverError for a solver that
     does not take the problem. Raises InstanceError when the field is on another instance, and OutputError.
     """
-    if solver not in STARTS:
-        raise InputError(f"there is no start format of {solver!r}; choose one of {', '.join(STARTS)}")
+    check_choice("start format of", solver, STARTS)
     start = complete_start(problem, field)
     refusal = _reason_of_refusal(problem, start, solver)
     if refusal:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from ...models.arguments import check_choice
 from ...models.errors import CrossfieldError, InputError, InstanceError
 from ...models.storage import require_suffix
 from ...models.written_files import check_targets
@@ -104,8 +105,7 @@ def check_names(names: list[str] | None, table: Mapping[str, Any], kind: str) ->
     Raises InputError for a name that is not in the table.
     """
     for name in names or ():
-        if name not in table:
-            raise InputError(f"there is no {kind} {name!r}; choose one of {', '.join(table)}")
+        check_choice(kind, name, table)
     return list(dict.fromkeys(names or table))
 
 

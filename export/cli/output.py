@@ -21,6 +21,7 @@ import typer
 
 from ...models.errors import CrossfieldError, printable
 from ...models.processes.deadline import Progress, silent
+from ..statuses import Status
 
 if TYPE_CHECKING:
     from ...models.instance.instance import Instance
@@ -244,12 +245,12 @@ def _describe_status(facts: dict[str, Any]) -> str:
 
 
 def _has_returned_start(facts: dict[str, Any]) -> bool:
-    return bool(facts.get("start_returned")) and not str(facts["status"]).startswith("optimal")
+    return bool(facts.get("start_returned")) and not Status(facts["status"]).is_optimal
 
 
 def _describe_gap(facts: dict[str, Any]) -> str:
     """Gap between a solver's answer and its bound; empty if it is closed, or if there is no bound."""
-    if str(facts["status"]).startswith("optimal"):
+    if Status(facts["status"]).is_optimal:
         return ""
     how = "returned its start" if _has_returned_start(facts) else ""
     if facts["gap"] is None:

@@ -15,6 +15,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from ...models.arguments import check_choice
 from ...models.errors import DomainError, InputError
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
@@ -243,8 +244,7 @@ def _save_figure(figure: Any, suffix: str, *, dots: int = _DOTS) -> bytes:
 
 def _find_kind(kind: str, subject: Subject) -> PictureKind:
     """The kind of that name. Raises InputError for an unknown one, and for one that needs a field."""
-    if kind not in KINDS:
-        raise InputError(f"there is no kind of picture {kind!r}; choose one of {', '.join(KINDS)}")
+    check_choice("kind of picture", kind, KINDS)
     if KINDS[kind].needs_field and isinstance(subject, Instance):
         raise InputError(
             f"{subject.name} is an instance without a field, which kind {kind} needs; solve it first, "

@@ -19,6 +19,7 @@ from typing import Any, Final, NamedTuple, Self
 
 import numpy as np
 
+from ...models.arguments import check_choice
 from ...models.errors import (
     InputError,
     MissingSolverError,
@@ -133,8 +134,8 @@ def choose_solver(problem: Problem, name: str | None = None) -> Solver:
     for an unknown name, UnsupportedBySolverError when the solver does not take the problem,
     MissingSolverError when its program is not installed.
     """
-    if name is not None and name not in SOLVERS:
-        raise InputError(f"there is no solver {name!r}; choose one of {', '.join(SOLVERS)}")
+    if name is not None:
+        check_choice("solver", name, SOLVERS)
     candidates = (
         [SOLVERS[name]] if name else [s for s in BUNDLED.values() if problem.problem_class not in s.not_for]
     )

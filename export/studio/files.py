@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
-from ...models.errors import InputError, shortened
+from ...models.arguments import check_choice
+from ...models.errors import InputError
 from ...models.field.file import write_field
 from ...models.instance.file import write_instance
 from ..bundle.problem_files import write_all
@@ -116,8 +117,7 @@ DOWNLOADS: Final = {
 
 def download(data: bytes, kind: str, formulation: str = "", form: str = "") -> tuple[str, bytes]:
     """Name and content of the file of an entry; several files are one archive. Raises InputError."""
-    if kind not in DOWNLOADS:
-        raise InputError(f"there is no download {shortened(kind)!r}; choose one of {', '.join(DOWNLOADS)}")
+    check_choice("download", kind, DOWNLOADS)
     document = Document.from_bytes(data)
     with tempfile.TemporaryDirectory(prefix="crossfield-") as name:
         folder = Path(name)

@@ -15,7 +15,7 @@ from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Any, Final, Literal, get_args
 
-from ..arguments import check_flag
+from ..arguments import check_choice, check_flag
 from ..errors import FormulationError, shortened
 from .expressions import Expression, Operand, Relation, Symbol, Term, expression_of, sum_of
 from .symbols import (
@@ -224,8 +224,7 @@ class Declaration:
         options = replace(self.defaults, **chosen)
         for name in ("relax", "limits"):
             check_flag(name, getattr(options, name), FormulationError)
-        if not isinstance(options.facet, str) or options.facet not in FACETS:
-            raise FormulationError(f"there is no facet {options.facet!r}; choose one of {', '.join(FACETS)}")
+        check_choice("facet", options.facet, FACETS, FormulationError)
         for name in ("stroke_norm", "beta_norm"):
             if getattr(options, name) not in TERM_NORMS:
                 raise FormulationError(f"{name} is {getattr(options, name)}; give 1 or 2")

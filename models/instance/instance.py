@@ -11,7 +11,7 @@ from typing import Any, Final, Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import check_flag, float_array, whole_numbers
+from ..arguments import check_choice, check_flag, float_array, whole_numbers
 from ..errors import DomainError, InstanceError, NoStrokeError
 from ..previews import Pictured
 from .angles import HALF, MOST_ANGLE, QUARTER, wrap
@@ -242,8 +242,7 @@ class Instance(Pictured):
                 f"the name {self.name[:40]!r} is not allowed; use a lower-case letter, "
                 "then at most 31 lower-case letters, digits and underscores"
             )
-        if not isinstance(self.gauge, str) or self.gauge not in GAUGES:
-            raise InstanceError(f"there is no gauge {self.gauge!r}; choose one of {', '.join(GAUGES)}")
+        check_choice("gauge", self.gauge, GAUGES, InstanceError)
         for name in ("stroke_coefficient", "skew_coefficient"):
             _check_weight(name, getattr(self, name))
         for name, text in (("source", self.source), ("view", self.view or "")):

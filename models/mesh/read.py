@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Final, Literal, get_args
 
-from ..arguments import check_flag
+from ..arguments import check_choice, check_flag
 from ..errors import InputError, naming
 from ..instance.instance import STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
 from ..instance.mesh import list_faces
@@ -74,8 +74,7 @@ def read_mesh(
     check_flag("boundary", boundary)
     if sharp is not None and not 0 < sharp <= 180:
         raise InputError(f"sharp is {sharp}; give degrees above 0 and up to 180")
-    if weights not in PAIR_WEIGHTS:
-        raise InputError(f"weights is {weights!r}; choose one of {', '.join(PAIR_WEIGHTS)}")
+    check_choice("kind of weights", weights, PAIR_WEIGHTS)
     with naming(path):
         mesh, lines = read_mesh_file(path)
         mesh.check()

@@ -14,7 +14,8 @@ from typing import Final, Literal, get_args
 
 import numpy as np
 
-from ..errors import InputError, NoStrokeError, naming, printable, shortened
+from ..arguments import check_choice
+from ..errors import InputError, NoStrokeError, naming, printable
 from ..instance.angles import line_of
 from ..instance.domain import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
@@ -277,6 +278,4 @@ def check_size(size: int) -> None:
 
 def check_silhouette(silhouette: str) -> None:
     """Raise InputError for an unknown treatment of silhouettes."""
-    if silhouette not in get_args(Silhouette):
-        known = " or ".join(get_args(Silhouette))
-        raise InputError(f"there is no silhouette {shortened(silhouette)!r}; choose {known}")
+    check_choice("silhouette", silhouette, get_args(Silhouette))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from importlib.resources import files
 from typing import Final, Literal
 
+from ..arguments import check_choice
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from ..mesh.read import mesh_sample
@@ -99,7 +100,8 @@ def sample(
     size = DEFAULT_SIZE if size is None else size
     check_size(size)
     check_silhouette(silhouette)
-    if _find_sample(name).kind == "analytic":
+    check_choice("sample", name, [*SAMPLES, *MESHES])
+    if SAMPLES[name].kind == "analytic":
         if silhouette != "none":
             raise InputError(f"{name} is computed, not drawn; choose the silhouette none")
         return analytic(
@@ -114,12 +116,5 @@ def sample(
 
 def sample_svg(name: str) -> str:
     """The SVG text of a built-in sketch. Raises InputError for an unknown name and for a computed sample."""
-    if _find_sample(name).kind == "analytic":
-        raise InputError(f"sample {name!r} is computed, not drawn; choose one of {', '.join(_DRAWN)}")
+    check_choice("drawn sample", name, _DRAWN)
     return files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")
-
-
-def _find_sample(name: str) -> Sample:
-    if name not in SAMPLES:
-        raise InputError(f"there is no sample {name!r}; choose one of {', '.join([*SAMPLES, *MESHES])}")
-    return SAMPLES[name]

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from ..arguments import check_choice
 from ..errors import InputError
 from ..instance.angles import arctangent, cosine, sine, transform_vectors, vector_length, wrap
 from ..instance.domain import Bools, Floats
@@ -236,8 +237,7 @@ def analytic(
         For a weight out of range.
 
     """
-    if name not in SURFACES:
-        raise InputError(f"there is no surface {name!r}; choose one of {', '.join(SURFACES)}")
+    check_choice("surface", name, SURFACES)
     check_size(size)
     return analytic_instance(
         SURFACES[name], name, size, gauge=gauge, stroke_weight=stroke_weight, skew_weight=skew_weight

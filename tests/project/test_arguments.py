@@ -67,7 +67,7 @@ cf.Instance.on_pixels("a", **pixel | {"w": [1j]})                  | w holds som
 cf.Instance.on_pixels("a", **pixel | {"stroke_pixels": [[0, 0.5]]}) | stroke_pixels holds something
 cf.Instance.on_pixels("a", **pixel, origin=3)                      | origin has shape ()
 cf.Instance.on_pixels("a", **pixel, gauge=["box"])       | no gauge ['box']; choose one of strokes, box
-cf.entries(rung=3)                                       | there is no rung '3'; choose one of tiny
+cf.entries(rung=3)                                       | there is no rung 3; choose one of tiny
 cf.surface(field, flip="no")                             | flip is 'no'; give True or False
 cf.write_all(instance, folder, formats="lp")             | there is no format 'l'; choose one of nl
 cf.write_all(instance, folder, formulations="qp")        | there is no formulation 'q'

@@ -12,6 +12,7 @@ from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
+from ....models.arguments import check_choice
 from ....models.errors import InputError, InstanceError, shortened
 from ....models.processes.deadline import Progress, silent
 from .table import TABLE, read_table
@@ -205,12 +206,11 @@ def entries(*, rung: str | None = None) -> list[LibraryEntry]:
         For an unknown rung.
 
     """
-    chosen = [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"])]
-    if not chosen:
+    if rung is not None:
         from ..plan.spec import RUNGS
 
-        raise InputError(f"there is no rung {shortened(rung)!r}; choose one of {', '.join(RUNGS)}")
-    return chosen
+        check_choice("rung", rung, RUNGS)
+    return [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"])]
 
 
 def entry(name: str) -> LibraryEntry:

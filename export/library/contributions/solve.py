@@ -12,8 +12,8 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
+from ....models.arguments import check_choice
 from ....models.errors import (
-    InputError,
     MissingSolverError,
     SolutionError,
     SolverError,
@@ -57,9 +57,11 @@ def solve_library(
     with the runs before it, and KeyboardInterrupt is raised. Raises InputError for an unknown name,
     MissingSolverError for a named solver that cannot be used.
     """
-    rungs = RUNGS[: RUNGS.index(_check_known(up_to or RUNGS[-1], RUNGS, "rung")) + 1]
+    check_choice("rung", up_to or RUNGS[-1], RUNGS)
+    rungs = RUNGS[: RUNGS.index(up_to or RUNGS[-1]) + 1]
     for name in solvers or ():
-        if missing := SOLVERS[_check_known(name, SOLVERS, "solver")].missing:
+        check_choice("solver", name, SOLVERS)
+        if missing := SOLVERS[name].missing:
             raise MissingSolverError(missing)
     chosen = dict.fromkeys(solvers or [name for name, solver in SOLVERS.items() if not solver.missing])
     Record("cf_none", "0" * 64, "none", "0", "no point", by=by, machine=machine).check()
@@ -86,12 +88,6 @@ def solve_library(
         if has_unbuilt_records(library):
             rebuild(library.folder, progress=progress)
     return records
-
-
-def _check_known(name: str, table: Any, kind: str) -> str:
-    if name not in table:
-        raise InputError(f"there is no {kind} {name!r}; choose from {', '.join(table)}")
-    return name
 
 
 @dataclass

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal, cast, get_args
 
+from ....models.arguments import check_choice
 from ....models.documents import schema_error
 from ....models.errors import InputError, UnsupportedByFormatError, naming, shortened
 from ....models.formulations.catalogue import (
@@ -364,25 +365,26 @@ def _first_repetition(names: Sequence[str]) -> tuple[int, str] | None:
 
 
 def _read_words(
-    table: dict[str, Any], key: str, known: Collection[str], default: tuple[str, ...], place: str = ""
+    table: dict[str, Any],
+    key: str,
+    known: Collection[str],
+    default: tuple[str, ...],
+    place: str = "",
+    *,
+    kind: str = "",
 ) -> tuple[str, ...]:
-    """The words of a list, all of them known, or the default."""
+    """The words of a list, all of them known, or the default. kind: of word; by default the key's."""
     words = tuple(table.get(key, default))
     for word in words:
-        _check_known(word, known, f"{place}{key}")
+        check_choice(kind or key.removesuffix("s"), word, known, place=f"{place}{key}")
     return words
-
-
-def _check_known(word: str, known: Collection[str], place: str, kind: str = "") -> None:
-    if word not in known:
-        raise InputError(f"{place}: there is no {kind}{shortened(word)!r}; choose from {', '.join(known)}")
 
 
 def _read_formulations(
     table: dict[str, Any], key: str, default: tuple[str, ...], place: str = ""
 ) -> tuple[str, ...]:
     """The full names of formulations in a list, or the default."""
-    named = _read_words(table, key, (*FORMULATIONS, *short_names()), default, place)
+    named = _read_words(table, key, (*FORMULATIONS, *short_names()), default, place, kind="formulation")
     formulations = tuple(declaration_of(name).name for name in named)
     if (name := _first_repetition(formulations)) is not None:
         raise InputError(f"{place}{key}: {name[1]!r} is listed twice; list it once")
@@ -445,10 +447,10 @@ def _read_sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[R
         drawn = {"what": word, "title": title, "seeds": seeds_of(table["seeds"], f"{place}seeds")}
         drawn["random"] = _read_random(table, word, place)
     elif kind == "mesh":
-        _check_known(word, MESHES, f"{place}mesh", "mesh ")
+        check_choice("mesh", word, MESHES, place=f"{place}mesh")
         drawn = {"what": word, "title": MESHES[word][0]}
     else:
-        _check_known(word, SAMPLES, f"{place}sample", "sample ")
+        check_choice("sample", word, SAMPLES, place=f"{place}sample")
         drawn = {"what": word, "title": SAMPLES[word].description}
     sketch = Sketch(
         name,

@@ -122,7 +122,7 @@ WRONG = {
     "no rung of pixels": (f"[rungs.mesh]\n{MESH.replace('mesh', 'sample', 1)}", "no rung takes it; add tiny"),
     "another rung": (
         f'[rungs.tiny]\nsizes = [4]\n[rungs.mesh]\n{MESH}rungs = ["tiny"]\n',
-        "there is no 'tiny'; choose from mesh",
+        "there is no rung 'tiny'; choose one of mesh",
     ),
     "an unknown mesh": (f"[rungs.mesh]\n{MESH.replace('disc', 'dish')}", "there is no mesh 'dish'; choose"),
     "strokes nearby": (f'[rungs.mesh]\n{MESH}points = "none"\n', "search, greedy or proven"),

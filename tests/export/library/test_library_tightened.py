@@ -127,7 +127,7 @@ def test_a_field_outside_the_windows_is_not_better_and_not_refused(lib, tmp_path
         ('["parity"]', "rungs.tiny.tightened: 'minlp-parity' is not in formulations"),
         ('["qp"]', "rungs.tiny.tightened: qp-fixed has fixed jumps"),
         ('["exact", "miqp-exact"]', "rungs.tiny.tightened: 'miqp-exact' is listed twice"),
-        ('["exakt"]', "rungs.tiny.tightened: there is no 'exakt'"),
+        ('["exakt"]', "rungs.tiny.tightened: there is no formulation 'exakt'"),
     ],
 )
 def test_a_bad_list_is_refused(tmp_path, stated, words):

@@ -226,7 +226,7 @@ def test_the_border_of_a_given_mask_is_the_outline(tmp_path):
 def test_a_drawing_of_nothing_but_its_outline_and_unknown_silhouettes_are_refused(tmp_path):
     with pytest.raises(InputError, match="every stroke runs along the outline; choose the silhouette none"):
         read(svg(RIM), silhouette="outer")
-    with pytest.raises(InputError, match="there is no silhouette 'inner'; choose none or outer"):
+    with pytest.raises(InputError, match="there is no silhouette 'inner'; choose one of none, outer"):
         cf.read_sketch(tmp_path / "none.svg", silhouette="inner")
 
 
