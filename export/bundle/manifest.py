@@ -11,7 +11,7 @@ import numpy as np
 
 from ...models.documents import read_document
 from ...models.errors import CrossfieldError, FormulationError, InstanceError
-from ...models.formulations.problem import Problem, formulate, with_products_lifted, with_windows
+from ...models.formulations.problem import Problem, formulate, with_windows
 from ...models.formulations.windows import Windows
 from ...models.instance.domain import Ints
 from ...models.instance.file import read_instance, write_instance
@@ -86,7 +86,7 @@ class Manifest:
     def problems_by_format(self, problem: Problem) -> dict[str, Problem]:
         """The problem in each format, as its files hold it: the same, or with its products lifted."""
         return {
-            file["format"]: with_products_lifted(problem) if file["lifted"] else problem
+            file["format"]: problem.with_products_lifted if file["lifted"] else problem
             for file in self.document["files"]
         }
 

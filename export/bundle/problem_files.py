@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable
-from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -72,7 +71,7 @@ def write_problem(
         If a file cannot be written, or if others are in the way.
 
     """
-    if not is_recordable(problem):
+    if not problem.is_recordable:
         changed = f"{problem.name} with columns fixed or products lifted"
         raise InputError(f"a manifest cannot record {changed}; write it as a single file")
     formats = tuple(formats)
@@ -232,12 +231,6 @@ def _write_problem_files(
     if start is not None:
         write_starts(problem, start, folder, stem)
     return write_manifest(problem, written, refused, folder, stem)
-
-
-def is_recordable(problem: Problem) -> bool:
-    """Whether formulation, options, jumps and windows determine a problem; nothing is fixed or lifted."""
-    plain = formulate(problem.instance, problem.name, p=problem.jumps, **asdict(problem.formulation.options))
-    return narrow_windows(plain, problem.windows).sha256 == problem.sha256
 
 
 def jumps_as_data(instance: Instance, name: str, start: CrossField | None) -> Ints | None:

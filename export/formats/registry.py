@@ -18,7 +18,7 @@ from typing import Any, Final
 from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.families import ANY_DEGREE
-from ...models.formulations.problem import Problem, with_products_lifted
+from ...models.formulations.problem import Problem
 from ...models.instance.domain import Floats
 from ...models.memory import check_memory
 from ...models.written_files import check_targets
@@ -161,7 +161,7 @@ def problem_in_format(problem: Problem, entry: Format) -> Problem:
     if entry.degree == ANY_DEGREE or _highest_degree(problem) <= entry.degree:
         return problem
     if _highest_degree(problem) < ANY_DEGREE:
-        lifted = with_products_lifted(problem)
+        lifted = problem.with_products_lifted
         if _highest_degree(lifted) <= entry.degree:
             return lifted
     instead = problem.formulation.equivalent

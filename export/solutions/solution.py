@@ -18,7 +18,7 @@ import numpy as np
 from ...models.arguments import check_flag
 from ...models.errors import InputError, SolutionError, UnsupportedByFormatError, naming
 from ...models.field.field import CrossField
-from ...models.formulations.problem import Problem, Violation, with_products_lifted
+from ...models.formulations.problem import Problem, Violation
 from ...models.instance.domain import Floats
 from ...models.previews import table_of
 from ..formats.registry import FORMATS, problem_in_format
@@ -390,8 +390,8 @@ def read_solution(
     problem
         The problem that was solved.
     held
-        The problem by format, with products lifted as in the solved file: `Manifest.held`. By default
-        positional values follow the files as they are written today.
+        The problem by format, with products lifted as in the solved file: `Manifest.problems_by_format`. By
+        default positional values follow the files as they are written today.
     tolerance
         Largest violation of a feasible point, in units of a column. It has no influence on the comparison of
         objectives. Claims of a point that violates more than 1e-5 are not kept.
@@ -460,7 +460,7 @@ def _canonical_form(raw: RawSolution, problem: Problem, held: Mapping[str, Probl
         return CanonicalForm(*forms.values())
     liftable = "p1" in problem.blocks and "z" not in problem.blocks
     named = liftable and np.strings.startswith(raw.names, b"z_").any()
-    return CanonicalForm(with_products_lifted(problem) if named else problem)
+    return CanonicalForm(problem.with_products_lifted if named else problem)
 
 
 def _problem_in_file(problem: Problem, name: str) -> Problem:

@@ -39,7 +39,6 @@ from ...models.processes.limits import Limits
 from ...models.storage import make_folder, replace_results
 from ..bundle.earlier import keep_better_answer, keep_better_field, objective_function
 from ..bundle.manifest import add_to_manifest, file_stem, instance_file
-from ..bundle.problem_files import is_recordable
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, file_names, problem_in_format, write
 from ..programs.protocol import (
@@ -274,7 +273,7 @@ class Solvers:
         def solve_in(place: Path) -> Solution:
             files = SolveFiles.for_model(place / model, solver)
             written = write(problem, files.model, start=start if taking.has_start else None)
-            if folder is not None and is_recordable(problem):
+            if folder is not None and problem.is_recordable:
                 add_to_manifest(problem, written, place, Path(folder))
             # Reading the answer takes about as long as writing the problem did.
             search = deadline.later(deadline.left() - limits.time_limit)

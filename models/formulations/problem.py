@@ -454,6 +454,19 @@ class Problem:
         """
         return stamp_of(self._digest(""))
 
+    @property
+    def is_recordable(self) -> bool:
+        """Whether formulation, options, jumps and windows determine it; nothing is fixed or lifted."""
+        return self.pinned is None and not self.formulation.lifted
+
+    @cached_property
+    def with_products_lifted(self) -> Problem:
+        """The problem with each p1 beta_i lifted to z, for formats up to quadratic.
+
+        Relaxed, it is weaker (`Formulation.is_weakened`).
+        """
+        return replace(self, formulation=lift_products(self.formulation))
+
     def _digest(self, lifting: str) -> str:
         text = f"{self.instance.sha256} {self.formulation.name} {self.formulation.options} {lifting}"
         digest = hashlib.sha256(text.encode())
@@ -551,8 +564,3 @@ def with_windows(problem: Problem, windows: Windows) -> Problem:
     Raises InstanceError for windows that are not within the windows of its gauge.
     """
     return replace(problem, windows=windows)
-
-
-def with_products_lifted(problem: Problem) -> Problem:
-    """The problem with each p1 beta_i lifted to z, for formats up to quadratic (`Formulation.weakened`)."""
-    return replace(problem, formulation=lift_products(problem.formulation))

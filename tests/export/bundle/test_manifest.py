@@ -17,7 +17,7 @@ from crossfield.models.errors import (
     InstanceError,
     UnsupportedByFormatError,
 )
-from crossfield.models.formulations.problem import with_integers_fixed, with_products_lifted
+from crossfield.models.formulations.problem import with_integers_fixed
 from crossfield.models.instance.file import read_instance, write_instance
 from folders import contents
 from loops import for_each
@@ -183,11 +183,11 @@ def test_documents_that_contradict_themselves_are_refused(keys, value, error, me
 
 def test_problems_that_no_manifest_records_are_refused(tmp_path):
     problem = make_problem("minlp-cubic", make_instance())
-    for other in (with_products_lifted(problem), with_integers_fixed(problem, make_field(problem.instance))):
+    for other in (problem.with_products_lifted, with_integers_fixed(problem, make_field(problem.instance))):
         with pytest.raises(InputError, match="a manifest cannot record minlp-cubic"):
             write_problem(other, tmp_path / "set")
     assert list(tmp_path.iterdir()) == []
-    write(with_products_lifted(problem), tmp_path / "single.lp")
+    write(problem.with_products_lifted, tmp_path / "single.lp")
     fixed = with_integers_fixed(problem, make_field(problem.instance))
     with pytest.raises(UnsupportedByFormatError, match="write nl, lp or mps"):
         write(fixed, tmp_path / "fixed.mod")

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cases import SKEWED
 from crossfield.export.bundle.manifest import read_manifest
-from crossfield.export.bundle.problem_files import is_recordable, write_all
+from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.solvers_table import PROGRAMS
@@ -58,8 +58,8 @@ def test_windows_are_narrower_and_hold_the_optimum(proof):
             assert (width < 0.2).all()
         assert narrow.violation(narrow.point(certificate.field)).worst < 1e-12
         assert narrow.sha256 != plain.sha256
-        assert not is_recordable(replace(narrow, pinned=certificate.field))
-        assert is_recordable(narrow)
+        assert not replace(narrow, pinned=certificate.field).is_recordable
+        assert narrow.is_recordable
         assert ("the optimum stays" in narrow.tightened) == (name in TWO_NORM)
         assert plain.tightened == ""
 

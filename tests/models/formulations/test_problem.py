@@ -22,7 +22,7 @@ from cases import (
 from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import CrossField
-from crossfield.models.formulations.problem import formulate, with_integers_fixed, with_products_lifted
+from crossfield.models.formulations.problem import formulate, with_integers_fixed
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from loops import for_each
@@ -116,7 +116,7 @@ def test_a_field_is_a_feasible_point_and_comes_back(label):
 def test_lifted_problems_are_exact(name):
     """At any angles and any binary p1, with z = p1 beta, far outside of the bounds as well."""
     problem = make_problem(name, make_instance())
-    other = with_products_lifted(problem)
+    other = problem.with_products_lifted
     assert (other.objective_degree, other.row_degree, other.is_convex) == (2, 1, name == "minlp-quartic")
     rng = np.random.default_rng(7)
     for point in points_of(problem):
@@ -128,9 +128,8 @@ def test_lifted_problems_are_exact(name):
         assert other.objective_value(extended) == pytest.approx(problem.objective_value(point), rel=1e-12)
     assert "hull" in other.formulation.lifted
     assert other.sha256 != problem.sha256
-    assert (
-        with_products_lifted(make_problem("minlp-cubic", make_instance(), relax=True)).problem_class == "QP"
-    )
+    relaxed = make_problem("minlp-cubic", make_instance(), relax=True)
+    assert relaxed.with_products_lifted.problem_class == "QP"
 
 
 def test_convex_problems_have_positive_semidefinite_hessians():
