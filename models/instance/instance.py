@@ -346,6 +346,11 @@ class Instance(Pictured):
         """The residuals of all strokes."""
         return StrokeTerms(self.stroke_index, self.target, self.stroke_coefficient * self.w)
 
+    @property
+    def point_weight(self) -> Floats:
+        """Sum of the weights w_strokes w of the strokes at each point, 0 without a stroke; shape (n,)."""
+        return self.stroke_terms.at_points(self.stroke_terms.weight, self.domain.size)
+
     @cached_property
     def cycles(self) -> Cycles:
         """A basis of the cycles of pairs and strokes, along which alone jumps matter."""

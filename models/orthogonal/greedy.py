@@ -13,8 +13,9 @@ import numpy as np
 from ..instance.angles import HALF
 from ..instance.cycles import grow_forest
 from ..instance.domain import Bools, Ints
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
-from ..smooth.sparse_systems import factor_matrix, one_thread
+from ..smooth.sparse_systems import factor_matrix
 from .energy import MOST_DENSE, OrthogonalEnergy
 
 _UPDATES: Final = 40  # of rank one between two factorisations

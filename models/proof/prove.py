@@ -12,6 +12,7 @@ from ..arguments import check_count
 from ..errors import InputError
 from ..field.field import CrossField, Norm, check_norm
 from ..instance.instance import Instance
+from ..processes.blas_threads import one_thread
 from ..processes.child_program import WorkerError
 from ..processes.compilation import crew
 from ..processes.deadline import Deadline, Progress, Stop, silent, stop_function
@@ -19,7 +20,6 @@ from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
 from ..processes.process_groups import are_interrupts_caught, catch_interrupts
 from ..search.stroked_parts import extended, restricted, stroked_parts
-from ..smooth.sparse_systems import one_thread
 from .certificate import REFUSALS, check_proof
 from .compiling import compile_proofs
 from .descent.absolute_descent import AbsoluteDescent

@@ -29,8 +29,8 @@ from ..instance.angles import HALF
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
-from ..smooth.sparse_systems import one_thread
 from .box_qp import angle_bounds, field_at
 
 if TYPE_CHECKING:

@@ -17,8 +17,9 @@ from ..field.field import CrossField, field_in_windows
 from ..instance.angles import QUARTER
 from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
-from ..smooth.sparse_systems import PULL, one_thread
+from ..smooth.sparse_systems import PULL
 from .energy import LinearSolver, QuadraticForm, energy_at
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15

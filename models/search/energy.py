@@ -17,7 +17,7 @@ from scipy.sparse.linalg import LinearOperator, cg
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
-from ..smooth.sparse_systems import PULL, Solve, factor_matrix, stroke_weight, symmetric_matrix
+from ..smooth.sparse_systems import PULL, Solve, factor_matrix, symmetric_matrix
 
 CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
 
@@ -50,7 +50,7 @@ def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> Quadra
     i, j = pairs.first, pairs.second
     of_pair = pairs.weighted(np.full(len(p), 2.0))
     degree = np.bincount(i, of_pair, n) + np.bincount(j, of_pair, n)
-    weight, turn = stroke_weight(instance), of_pair * pairs.offset(p)
+    weight, turn = instance.point_weight, of_pair * pairs.offset(p)
     couplings = np.concatenate([-of_pair, -of_pair * parity_sign(p), weight[at]])
     diagonal = np.concatenate([degree + weight, degree + weight + instance.skew_coefficient])
     row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])

@@ -17,8 +17,9 @@ from ..field.jumps import free_jumps
 from ..instance.domain import Bools, Ints
 from ..instance.instance import Instance
 from ..orthogonal.energy import takes_integers
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
-from ..smooth.sparse_systems import one_thread, solve_locally
+from ..smooth.sparse_systems import solve_locally
 from .box_qp import FreeField
 from .energy import CLOSE, LinearSolver, energy_at
 from .integer_fields import greedy_integer_field

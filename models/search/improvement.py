@@ -20,8 +20,8 @@ from ..instance.domain import Ints
 from ..instance.instance import Instance
 from ..instance.terms import parity_sign
 from ..orthogonal.energy import takes_integers
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Stop, never, stop_function
-from ..smooth.sparse_systems import one_thread
 from .box_qp import FreeField, minimise_in_box, stroke_bounds
 from .energy import CLOSE, LinearSolver, energy_at
 from .nearest_stroke import chamfer_distances, nearest_strokes

@@ -17,7 +17,7 @@ from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.grid import Grid
 from ..orthogonal.energy import OrthogonalEnergy
-from ..smooth.sparse_systems import one_thread
+from ..processes.blas_threads import one_thread
 from .box_qp import angle_bounds, field_at, fit_in_box
 from .energy import LinearSolver, QuadraticForm, energy_at
 from .nearest_stroke import nearest_strokes

@@ -20,13 +20,13 @@ from ..instance.domain import Bools
 from ..instance.instance import Instance
 from ..orthogonal.energy import OrthogonalEnergy, lowered, takes_integers
 from ..orthogonal.search import IntegerSearch
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
 from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
 from ..processes.process_groups import catch_interrupts
 from ..processes.process_pool import parallel_map
 from ..smooth.polyvector import power_field
-from ..smooth.sparse_systems import one_thread
 from .box_qp import FreeField, stroke_bounds
 from .energy import LinearSolver
 from .improvement import pixel_curves, settle

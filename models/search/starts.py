@@ -19,9 +19,10 @@ from ..field.fusion import fuse_fields
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from ..orthogonal.energy import takes_integers
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
-from ..smooth.sparse_systems import one_thread, solve_locally
+from ..smooth.sparse_systems import solve_locally
 from .box_qp import FreeField, fit_in_box, stroke_bounds
 from .coarse_grid import copy_to_fine_grid, halve_resolution
 from .energy import LinearSolver, energy_at

@@ -20,8 +20,8 @@ import numpy as np
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..orthogonal.energy import lowered
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Deadline, Over
-from ..smooth.sparse_systems import one_thread
 from .box_qp import field_at
 from .landscape import STEPS, FieldPoint, Landscape, Patch
 

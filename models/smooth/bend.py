@@ -21,8 +21,8 @@ from ..field.field import CrossField
 from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.domain import Floats, Ints
 from ..instance.grid import Grid
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Stop, stop_function
-from .sparse_systems import one_thread
 from .two_levels import approximate_inverse
 
 _Places = NDArray[np.intp]

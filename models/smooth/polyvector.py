@@ -22,7 +22,8 @@ from ..instance.angles import HALF
 from ..instance.domain import Floats
 from ..instance.grid import Grid
 from ..instance.instance import Instance
-from .sparse_systems import Solve, factor_matrix, one_thread, smoothness, solve_locally, stroke_weight
+from ..processes.blas_threads import one_thread
+from .sparse_systems import Solve, factor_matrix, smoothness, solve_locally
 from .two_levels import FEW, approximate_inverse
 
 _Complex = NDArray[np.complex128]
@@ -154,7 +155,7 @@ def power_field(instance: Instance) -> CrossField:
     goal = np.stack(
         [strokes.at_points(strokes.weight * f(4 * instance.theta), size) for f in (np.cos, np.sin)], axis=-1
     )
-    matrix = smoothness(instance, power=4) + sparse.diags_array(stroke_weight(instance))
+    matrix = smoothness(instance, power=4) + sparse.diags_array(instance.point_weight)
     solve = factor_matrix(matrix)
     if np.iscomplexobj(matrix):
         z = solve(goal @ np.array([1, 1j]))

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from functools import cache
+from collections.abc import Callable
 from typing import Any, Final
 
 import numpy as np
 from scipy import sparse
 from scipy.linalg import solveh_banded
 from scipy.sparse.linalg import LinearOperator, cg, splu
-from threadpoolctl import OpenBLASController, ThreadpoolController
 
 from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
+from ..processes.blas_threads import one_thread
 
 Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 
@@ -26,13 +23,6 @@ _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution woul
 _DENSE: Final = 8  # columns of a dense block in the factors by nested dissection
 _LEAF: Final = 24  # places that are not parted
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
-_LOCK: Final = threading.Lock()
-_HELD: Final[list[Any]] = []  # the limit of BLAS, once for each context that is open
-
-
-def stroke_weight(instance: Instance) -> Floats:
-    """Weight w_strokes w of each pixel, of both strokes where two meet, 0 without a stroke; shape (n,)."""
-    return instance.stroke_terms.at_points(instance.stroke_terms.weight, instance.domain.size)
 
 
 def smoothness(instance: Instance, power: int = 0) -> Any:
@@ -177,47 +167,3 @@ class SimilarSystems:
                 return found
         self._factors = factor_matrix(matrix, self._order)
         return self._factors(right)
-
-
-@contextmanager
-def one_thread() -> Iterator[None]:
-    """Context, and decorator, that limits BLAS to one thread: faster on tiny blocks, with constant sums.
-
-    Contexts may be nested, and several threads may be inside at once. The number of threads of BLAS is a
-    setting of the whole process: it returns to its old value when the last context ends.
-    """
-    with _LOCK:
-        if _HELD:
-            _HELD.append(_HELD[0])
-        else:
-            with _any_thread_may_set():
-                _HELD.append(_libraries().limit(limits=1, user_api="blas"))
-    try:
-        yield
-    finally:
-        with _LOCK:
-            held = _HELD.pop()
-            if not _HELD:
-                with _any_thread_may_set():
-                    held.restore_original_limits()
-
-
-@contextmanager
-def _any_thread_may_set() -> Iterator[None]:
-    """Context in which threadpoolctl lets this thread set the number of threads of OpenBLAS."""
-    # Since version 3.8 it ignores all threads but the first, and another may be the last to leave.
-    release = getattr(OpenBLASController, "clear_controlling_thread", None)
-    if release is None:
-        yield
-        return
-    release(force=True)
-    try:
-        yield
-    finally:
-        release(force=True)
-
-
-@cache
-def _libraries() -> ThreadpoolController:
-    """The libraries of this process that run threads; looking for them takes milliseconds."""
-    return ThreadpoolController()

@@ -14,8 +14,8 @@ from ..arguments import check_flag
 from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.grid import Grid
+from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Progress, Stop, silent, stop_function
-from ..smooth.sparse_systems import one_thread
 from .equations import FORGIVEN, Equations, Weights, descend, normals_of
 from .hints import Hint, check_hints, hint_rows
 from .stencils import Crosses, GridLevel, Stencils, levels_of

@@ -28,7 +28,6 @@ from ...instance.domain import Bools, Floats
 from ...instance.grid import Grid
 from ...processes.compilation import Crew
 from ...processes.deadline import Over, never
-from ...smooth.sparse_systems import stroke_weight
 from ..checkers import check_certificate
 from .clusters import (
     copy_tables,
@@ -237,7 +236,7 @@ class Dual:
         """
         lattice, (shares, costs) = self.lattice, self._greatest_sizes()
         instance, n, m = lattice.instance, len(lattice.count), len(lattice.p)
-        weight, skew = stroke_weight(instance), instance.skew_coefficient
+        weight, skew = instance.point_weight, instance.skew_coefficient
         size = 2 + np.abs([lattice.alpha, lattice.beta]).sum(axis=0)
         size += lattice.h * np.abs(lattice.alpha_first) + lattice.h * lattice.alpha_count
         size += lattice.h * np.abs(lattice.beta_first) + lattice.h * lattice.beta_count

@@ -28,7 +28,6 @@ from ...instance.angles import HALF, QUARTER, wrap
 from ...instance.domain import Bools, Floats, Ints
 from ...instance.grid import Grid
 from ...instance.instance import Instance
-from ...smooth.sparse_systems import stroke_weight
 
 Starts = NDArray[np.int64]  # places in flat arrays, as of the starts of blocks and the end of the last one
 
@@ -140,7 +139,7 @@ class Lattice:
     def unary_costs(self) -> Floats:
         """D of each label, flat: skew and stroke term; inf for labels that are not allowed."""
         cost = np.full(self.start[-1], np.inf)
-        weights = stroke_weight(self.instance)
+        weights = self.instance.point_weight
         for begin in range(0, len(cost), _AT_ONCE):
             at = begin + np.flatnonzero(self.allowed[begin : begin + _AT_ONCE])
             alpha, beta = self.angles(at)

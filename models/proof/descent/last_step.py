@@ -23,7 +23,6 @@ from ...instance.instance import Instance
 from ...processes.deadline import Over, never
 from ...search.angle_program import solve_angle_program
 from ...search.box_qp import field_at
-from ...smooth.sparse_systems import stroke_weight
 from ..bound.pruning import RemainingCells
 from ..checkers.check_certificate import (
     BoxPiece,
@@ -62,7 +61,7 @@ def energy_terms(instance: Instance, norm: Norm) -> EnergyTerms:
     theta = none.copy()
     theta[instance.stroke_index] = instance.target
     white = (grid.rows + grid.columns) % 2 == 1
-    strokes = stroke_weight(instance), theta, none, none
+    strokes = instance.point_weight, theta, none, none
     return EnergyTerms(norm, grid.first, grid.second, white, *strokes, instance.skew_coefficient)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 
 import pytest
-from crossfield.models.smooth.sparse_systems import one_thread
+from crossfield.models.processes.blas_threads import one_thread
 from threadpoolctl import ThreadpoolController
 
 MANY = 2
