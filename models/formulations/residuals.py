@@ -25,15 +25,15 @@ def limit_residuals(instance: Instance) -> tuple[Floats, Floats]:
     all pairs and of strokes as pairs with the ground. No optimum gains by that, so |A| <= pi/4 (1 - r);
     strokes likewise. Fields that one such change improves are cut off.
     """
-    from ..orthogonal.energy import OrthogonalEnergy  # it loads SciPy, which other files do not need
+    from ..instance.least_squares import RightAngles  # it loads SciPy, which other files do not need
 
-    energy = OrthogonalEnergy.of(instance)
-    rows, count = energy.rows, len(energy.weight)
+    terms = RightAngles.of(instance)
+    rows, count = terms.matrix, len(terms.weight)
     resistance = np.zeros(count)
     for start in range(0, count, _BLOCK):
         sides = rows[start : start + _BLOCK].toarray().T
-        resistance[start : start + _BLOCK] = (sides * energy.solve_system(sides)).sum(axis=0)
-    limits = np.minimum(QUARTER * (1 - energy.weight * resistance) + _ROUNDING, QUARTER)
+        resistance[start : start + _BLOCK] = (sides * terms.solve_system(sides)).sum(axis=0)
+    limits = np.minimum(QUARTER * (1 - terms.weight * resistance) + _ROUNDING, QUARTER)
     pairs = len(instance.domain.first)
     return limits[:pairs], limits[pairs:]
 

@@ -11,20 +11,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.csgraph import connected_components
 
 from ..field.field import CrossField, field_in_windows
 from ..field.jumps import step_labels
 from ..instance.angles import HALF
 from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
+from ..instance.least_squares import RightAngles
 from ..instance.mesh import Mesh
 from ..processes.deadline import Over, never
-from ..smooth.sparse_systems import Solve, factor_matrix
 
 MOST_DENSE: Final = 6000
 """Points up to which the inverse of the matrix is kept: 288 MB."""
@@ -41,31 +39,8 @@ def takes_integers(instance: Instance) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class OrthogonalEnergy:
-    """The energy of crosses with beta = 0, given their integers z (r,): those of the pairs, then of strokes.
-
-    size: number of points n. first, second: the ends of each row, (r,); n is the ground. offset: c in
-    radians, (r,). weight: omega, at least 0, (r,).
-    """
-
-    size: int
-    first: Ints
-    second: Ints
-    offset: Floats
-    weight: Floats
-
-    @classmethod
-    def of(cls, instance: Instance) -> OrthogonalEnergy:
-        """Return the energy of an instance as if all its crosses were orthogonal."""
-        pairs, strokes, n = instance.pair_terms, instance.stroke_terms, instance.domain.size
-        m, s = len(pairs.first), len(strokes.point)
-        return cls(
-            n,
-            np.concatenate([pairs.first, strokes.point]),
-            np.concatenate([pairs.second, np.full(s, n, dtype=np.int32)]),
-            np.concatenate([np.broadcast_to(pairs.offset(0), m), -strokes.goal]),
-            np.concatenate([pairs.weighted(np.full(m, 2.0)), strokes.weight]),
-        )
+class OrthogonalEnergy(RightAngles):
+    """The energy of crosses with beta = 0 at given integers z (r,): those of pairs, then of strokes."""
 
     def restrict(self, points: Ints, alpha: Floats) -> tuple[OrthogonalEnergy, Ints]:
         """The energy of the rows at some points, the angles of all others fixed; and these rows' numbers."""
@@ -74,47 +49,13 @@ class OrthogonalEnergy:
         first, second, fixed = number[self.first], number[self.second], alpha.copy()
         fixed[points] = 0.0
         rows = np.nonzero(np.minimum(first, second) < len(points))[0].astype(np.int32)
-        offset = self.residuals(fixed, 0)[rows]
-        return OrthogonalEnergy(len(points), first[rows], second[rows], offset, self.weight[rows]), rows
-
-    @cached_property
-    def rows(self) -> Any:
-        """The matrix M, sparse (r, n)."""
-        count = len(self.first)
-        values, row = np.repeat([1.0, -1.0], count), np.tile(np.arange(count), 2)
-        ends = np.concatenate([self.first, self.second])
-        return sparse.csr_array((values, (row, ends)), shape=(count, self.size + 1))[:, : self.size]
-
-    @cached_property
-    def links(self) -> Any:
-        """Sparse matrix (n, n) with an entry where a row of weight joins two points."""
-        used = (np.maximum(self.first, self.second) < self.size) & (self.weight > 0)
-        ends = (self.first[used], self.second[used])
-        return sparse.csr_array((np.ones(len(ends[0])), ends), shape=(self.size, self.size))
-
-    @cached_property
-    def pins(self) -> Ints:
-        """First point of each part that no row of weight ties to the ground: its angle is 0."""
-        part = connected_components(self.links, directed=False)[1]
-        ties = (np.maximum(self.first, self.second) == self.size) & (self.weight > 0)
-        parts, points = np.unique(part, return_index=True)
-        tied = part[np.minimum(self.first, self.second)[ties]]
-        return np.asarray(points[~np.isin(parts, tied)], dtype=np.int32)
-
-    def matrix_of(self, weight: Floats) -> Any:
-        """The matrix M' diag(weight) M, sparse (n, n); definite if its rows join what these rows join."""
-        pinned = np.zeros(self.size)
-        pinned[self.pins] = 1.0
-        return self.rows.T @ sparse.diags_array(weight) @ self.rows + sparse.diags_array(pinned)
-
-    @cached_property
-    def solve_system(self) -> Solve:
-        """The solver of M' diag(omega) M."""
-        return factor_matrix(self.matrix_of(self.weight), pull=0.0)
+        constant = self.residuals(fixed, 0)[rows]
+        patch = OrthogonalEnergy.between(len(points), first[rows], second[rows], constant, self.weight[rows])
+        return patch, rows
 
     def force(self, weight: Floats, z: Ints) -> Floats:
         """M' diag(weight) (c + pi/2 z), (n,)."""
-        return np.asarray(self.rows.T @ (weight * (self.offset + HALF * z)))
+        return np.asarray(self.matrix.T @ (weight * (self.constant + HALF * z)))
 
     def fit_angles(self, z: Ints) -> Floats:
         """The angles of least energy for integers z, (n,)."""
@@ -122,8 +63,7 @@ class OrthogonalEnergy:
 
     def residuals(self, alpha: Floats, z: Ints | int) -> Floats:
         """The residual of each row in radians, (r,), of the angles alpha (n,)."""
-        grounded = np.append(alpha, 0.0)
-        return np.asarray(grounded[self.first] - grounded[self.second] + self.offset + HALF * z)
+        return self.at(alpha) + HALF * z
 
     def total(self, residual: Floats) -> float:
         """The sum of omega r^2."""

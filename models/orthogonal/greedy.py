@@ -13,9 +13,9 @@ import numpy as np
 from ..instance.angles import HALF
 from ..instance.cycles import grow_forest
 from ..instance.domain import Bools, Ints
+from ..instance.sparse_systems import factor_matrix
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
-from ..smooth.sparse_systems import factor_matrix
 from .energy import MOST_DENSE, OrthogonalEnergy
 
 _UPDATES: Final = 40  # of rank one between two factorisations
@@ -32,7 +32,7 @@ def round_greedily(energy: OrthogonalEnergy, over: Over = never) -> Ints:
     z, known = np.zeros(len(energy.first), dtype=np.int32), find_forest_rows(energy)
     while not known.all():
         weight = np.where(known, energy.weight, 0.0)
-        solve = factor_matrix(energy.matrix_of(weight), pull=0.0)
+        solve = factor_matrix(energy.weighted_matrix(weight), pull=0.0)
         alpha = np.append(-solve(energy.force(weight, z)), 0.0)
         # A row that is known from now on changes the inverse by a matrix factor column column' of rank one.
         columns, factors = np.zeros((energy.size + 1, _UPDATES)), np.zeros(_UPDATES)
@@ -51,7 +51,7 @@ def round_greedily(energy: OrthogonalEnergy, over: Over = never) -> Ints:
             ends[i], ends[j] = 1.0, -1.0
             column = np.append(solve(ends), 0.0) - columns @ (factors * (columns[i] - columns[j]))
             factors[number] = omega / (1 + omega * (column[i] - column[j]))
-            alpha -= factors[number] * (alpha[i] - alpha[j] + energy.offset[row] + HALF * z[row]) * column
+            alpha -= factors[number] * (alpha[i] - alpha[j] + energy.constant[row] + HALF * z[row]) * column
             columns[:, number] = column
     return z
 

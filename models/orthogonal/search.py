@@ -99,7 +99,7 @@ class _Moves:
         self._beside = np.full((len(energy.first), 2), -1)
         ring = np.repeat(np.arange(len(rings.defect)), np.diff(rings.start))
         self._beside[rings.pair, (rings.sign < 0).astype(int)] = ring
-        by_point = abs(energy.rows).tocsc()
+        by_point = abs(energy.matrix).tocsc()
         self._start, self._at_point = by_point.indptr, by_point.indices
 
     def lower(self, point: Point, rng: np.random.Generator, over: Over) -> Point:
@@ -157,7 +157,7 @@ class _Moves:
         """Move a quarter of a turn from a ring, a singular one or any, along a random path of rings."""
         rings = self._rings
         ring, quarter = int(rng.integers(len(rings.defect))), int(rng.choice((-1, 1)))
-        turn = np.round((rings.defect - rings.sums(self._energy.offset + HALF * z)) / HALF)
+        turn = np.round((rings.defect - rings.sums(self._energy.constant + HALF * z)) / HALF)
         if len(singular := np.nonzero(turn)[0]) and rng.random() < _SINGULAR:
             ring = int(rng.choice(singular))
             quarter = int(np.sign(turn[ring]))

@@ -25,10 +25,9 @@ from scipy.sparse import linalg
 from ..errors import CrossfieldError
 from ..field.field import AbsoluteNorm, CrossField, Norm
 from ..field.jumps import best_jumps
-from ..instance.angles import HALF
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
-from ..instance.terms import parity_sign
+from ..instance.least_squares import Residuals, residuals_at
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
 from .box_qp import angle_bounds, field_at
@@ -43,49 +42,27 @@ _DECIMALS: Final = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Residuals:
-    """The residuals Mx + c of all terms at given jumps, and their weights k, shapes (r, 2n), (r,), (r,).
+class NormResiduals(Residuals):
+    """The residuals of all terms at given jumps, with the energy sum of k phi(r) of a norm.
 
     squared (r,): where phi is the square.
     """
 
-    matrix: sparse.csr_array
-    constant: Floats
-    weight: Floats
     squared: Bools
 
     @classmethod
-    def at(
+    def of(
         cls, instance: Instance, p: Ints, norm: Norm, lines: Ints | None = None, target: Floats | None = None
-    ) -> Residuals:
-        """Residuals at jumps p (m,): A and B of all pairs, R of all strokes, then beta of all pixels.
-
-        lines (s,): 0 where line u carries the stroke, None for zeros; -1 and 1 where v does, below and above
-        the window of u. target (s,): the direction of each stroke at one turn, None for that of the gauge.
-        """
-        n, pairs, strokes = instance.domain.size, instance.pair_terms, instance.stroke_terms
-        unit, m = sparse.eye_array(n, format="csr"), len(p)
-        lines = np.zeros(len(strokes.goal), np.int32) if lines is None else lines
-        target = strokes.goal if target is None else target
-        nothing, at = sparse.csr_array((m, n)), unit[strokes.point]
-        a = sparse.hstack([unit[pairs.first] - unit[pairs.second], nothing])
-        signed = sparse.diags_array(parity_sign(p)) @ unit[pairs.first]
-        b = sparse.hstack([nothing, signed - unit[pairs.second]])
-        r = sparse.hstack([at, sparse.diags_array(np.where(lines == 0, 1.0, -1.0)) @ at])
-        skew = sparse.hstack([sparse.csr_array((n, n)), unit])
-        of_pair = pairs.weighted(np.full(m, 2.0))
-        skew_weight = np.full(n, instance.skew_coefficient)
-        weight = np.concatenate([of_pair, of_pair, strokes.weight, skew_weight])
-        return cls(
-            sparse.vstack([a, b, r, skew], format="csr"),
-            np.concatenate([pairs.offset(p), np.zeros(m), -target - HALF * lines, np.zeros(n)]),
-            weight,
-            (norm == 2) | ((np.arange(len(weight)) >= 2 * m) & (norm == "mixed")),
-        )
+    ) -> NormResiduals:
+        """The residuals at jumps p (m,). lines, target: as of `residuals_at`."""
+        terms = residuals_at(instance, p, lines=lines, target=target)
+        of_pair = np.arange(len(terms.weight)) < 2 * len(p)
+        squared = (norm == 2) | (~of_pair & (norm == "mixed"))
+        return cls(terms.matrix, terms.constant, terms.weight, squared)
 
     def energy(self, x: Floats) -> float:
         """The energy at angles x."""
-        sizes = np.abs(self.matrix @ x + self.constant)
+        sizes = np.abs(self.at(x))
         return float(self.weight @ np.where(self.squared, sizes * sizes, sizes))
 
     def bound(self, multipliers: Floats, lower: Floats, upper: Floats, tilt: Floats) -> float:
@@ -109,7 +86,7 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class AngleFit:
-    """The best angles x (2n,) in a box, the multipliers (r,) of `Residuals`, and the bound that they give.
+    """The best angles x (2n,) in a box, the multipliers (r,) of its residuals, and the bound that they give.
 
     Multipliers are 0 where weights are 0.
     """
@@ -134,10 +111,10 @@ def solve_angle_program(
     """Compute the angles that minimise the energy minus tilt x in a box, with Clarabel.
 
     p: jumps, shape (m,). lower, upper: the box of x = (alpha, beta) in radians, shapes (2n,). tilt: shape
-    (2n,), None for zeros. lines, target: as of `Residuals.at`. weight (r,): of the residuals, None for theirs
+    (2n,), None for zeros. lines, target: as of `residuals_at`. weight (r,): of the residuals, None for theirs
     in the energy. Raises CrossfieldError when Clarabel finds no solution; one always exists.
     """
-    terms = Residuals.at(instance, p, norm, lines, target)
+    terms = NormResiduals.of(instance, p, norm, lines, target)
     if weight is not None:
         terms = replace(terms, weight=weight)
     tilt = np.zeros(len(lower)) if tilt is None else tilt
@@ -147,7 +124,7 @@ def solve_angle_program(
     return AngleFit(x, multipliers, terms.bound(multipliers, lower, upper, tilt))
 
 
-def _solve_program(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
+def _solve_program(terms: NormResiduals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
     """The angles and the multipliers that solve the program, with a size t >= |r| for each absolute value."""
     import clarabel
 
@@ -176,7 +153,7 @@ def _solve_program(terms: Residuals, lower: Floats, upper: Floats, tilt: Floats)
     if not m:
         angles = _polish(curved, square.T @ (force * goal) - tilt, angles, lower, upper)
     above, below = np.split(np.array(solution.z)[: 2 * m], 2)
-    multipliers = 2 * (terms.matrix @ angles + terms.constant)
+    multipliers = 2 * terms.at(angles)
     multipliers[rows] = (above - below) / weight
     return angles, multipliers
 

@@ -17,10 +17,11 @@ from ..field.field import CrossField, field_in_windows
 from ..instance.angles import QUARTER
 from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
+from ..instance.least_squares import Residuals, residuals_at
+from ..instance.sparse_systems import PULL
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
-from ..smooth.sparse_systems import PULL
-from .energy import LinearSolver, QuadraticForm, energy_at
+from .energy import LinearSolver
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
 _NEAR: Final = 1e-3  # radians from a bound within which it may hold a variable
@@ -35,7 +36,7 @@ def fit_in_box(field: CrossField, over: Over = never) -> CrossField:
 
     Where the energy does not determine angles (parts without strokes), they stay near the given ones.
     """
-    energy, x = energy_at(field.instance, field.p), np.concatenate([field.alpha, field.beta])
+    energy, x = residuals_at(field.instance, field.p), np.concatenate([field.alpha, field.beta])
     x = minimise_in_box(energy, x, *angle_bounds(field.instance), over=over)
     return field_at(field.instance, x, field.p)
 
@@ -64,7 +65,7 @@ def stroke_bounds(instance: Instance) -> tuple[Floats, Floats]:
 
 @one_thread()
 def minimise_in_box(
-    energy: QuadraticForm,
+    energy: Residuals,
     x: Floats,
     lower: Floats,
     upper: Floats,
@@ -80,8 +81,8 @@ def minimise_in_box(
     solver: one that was used for a similar system, which saves a factorisation.
     """
     solver = LinearSolver() if solver is None else solver
-    enough = tolerance * (1 + np.abs(energy.vector).max())
-    stiffness = energy.matrix.diagonal() + PULL
+    enough = tolerance * (1 + np.abs(energy.right_side).max())
+    stiffness = energy.normal_matrix.diagonal() + PULL
     x = np.clip(x, lower, upper)
     for _ in range(_MOST_STEPS):
         if over():
@@ -92,7 +93,7 @@ def minimise_in_box(
             break
         near = min(_NEAR, np.abs(plain).max())
         held = np.where(slope > 0, x <= lower + near, x >= upper - near)
-        step = np.where(held, plain, solver.step(energy.matrix, -slope, _NEWTON, ~held))
+        step = np.where(held, plain, solver.step(energy.normal_matrix, -slope, _NEWTON, ~held))
         ends = (np.clip(x + 0.5**k * step, lower, upper) for k in range(_MOST_HALVINGS))
         end = next((end for end in ends if _falls_enough(energy, slope, end - x)), None)
         if end is None:
@@ -101,7 +102,7 @@ def minimise_in_box(
     return x
 
 
-def _falls_enough(energy: QuadraticForm, slope: Floats, step: Floats) -> bool:
+def _falls_enough(energy: Residuals, slope: Floats, step: Floats) -> bool:
     """Whether a nonzero step lowers the energy by a fair share of the decrease that the slope promises."""
     promised = float(slope @ step)
     return promised < 0 and energy.change(slope, step) <= 2 * _DECREASE * promised

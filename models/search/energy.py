@@ -7,57 +7,18 @@ beta_i, and w_beta.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
-from ..instance.domain import Bools, Floats, Ints
-from ..instance.instance import Instance
-from ..instance.terms import parity_sign
-from ..smooth.sparse_systems import PULL, Solve, factor_matrix, symmetric_matrix
+from ..instance.domain import Bools, Floats
+from ..instance.sparse_systems import PULL, Solve, factor_matrix
 
 CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
 
 _MOST_STEPS: Final = 25  # of conjugate gradients; beyond, a new factorisation is cheaper
-
-
-@dataclass(frozen=True, eq=False)
-class QuadraticForm:
-    """A quadratic x'Hx - 2 b'x: matrix H, sparse (2n, 2n), positive semidefinite, and vector b (2n,)."""
-
-    matrix: Any
-    vector: Floats
-
-    def slope(self, x: Floats) -> Floats:
-        """Half the gradient, Hx - b, shape (2n,)."""
-        slope: Floats = self.matrix @ x - self.vector
-        return slope
-
-    def change(self, slope: Floats, step: Floats) -> float:
-        """Change of the value for a step from the point of that slope."""
-        return float(step @ (2 * slope + self.matrix @ step))
-
-
-def energy_at(instance: Instance, p: Ints, known: Bools | None = None) -> QuadraticForm:
-    """The 2-norm energy as a function of the angles, over the pairs of known jump (None: all)."""
-    n, at, strokes = instance.domain.size, instance.stroke_index, instance.stroke_terms
-    pairs = instance.pair_terms
-    if known is not None:
-        pairs, p = pairs.select(known), p[known]
-    i, j = pairs.first, pairs.second
-    of_pair = pairs.weighted(np.full(len(p), 2.0))
-    degree = np.bincount(i, of_pair, n) + np.bincount(j, of_pair, n)
-    weight, turn = instance.point_weight, of_pair * pairs.offset(p)
-    couplings = np.concatenate([-of_pair, -of_pair * parity_sign(p), weight[at]])
-    diagonal = np.concatenate([degree + weight, degree + weight + instance.skew_coefficient])
-    row, column = np.concatenate([i, i + n, at]), np.concatenate([j, j + n, at + n])
-    matrix = symmetric_matrix(row, column, couplings, diagonal)
-    goal = strokes.at_points(strokes.weight * strokes.goal, n)
-    pulled = np.bincount(j, turn, n) - np.bincount(i, turn, n)
-    return QuadraticForm(matrix, np.concatenate([pulled + goal, goal]))
 
 
 class LinearSolver:

@@ -16,12 +16,13 @@ from ..field.field import CrossField
 from ..field.jumps import free_jumps
 from ..instance.domain import Bools, Ints
 from ..instance.instance import Instance
+from ..instance.least_squares import residuals_at
+from ..instance.sparse_systems import solve_locally
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
-from ..smooth.sparse_systems import solve_locally
 from .box_qp import FreeField
-from .energy import CLOSE, LinearSolver, energy_at
+from .energy import CLOSE, LinearSolver
 from .integer_fields import greedy_integer_field
 from .nearest_stroke import nearest_strokes
 
@@ -117,9 +118,9 @@ def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: 
 
 def _update_angles(state: FreeField, known: Bools, solver: LinearSolver, local: float | None) -> None:
     """Update angles, accurately enough to rank the unknown jumps."""
-    energy = energy_at(state.instance, state.p, known)
+    energy = residuals_at(state.instance, state.p, known)
     right = -energy.slope(state.x)
     if local is None:
-        state.x = state.x + solver.step(energy.matrix, right, CLOSE)
+        state.x = state.x + solver.step(energy.normal_matrix, right, CLOSE)
     else:
-        state.x = state.x + solve_locally(energy.matrix, right, local)
+        state.x = state.x + solve_locally(energy.normal_matrix, right, local)

@@ -18,12 +18,13 @@ from ..field.jumps import free_jumps, step_labels
 from ..instance.angles import HALF, QUARTER, line_difference
 from ..instance.domain import Ints
 from ..instance.instance import Instance
+from ..instance.least_squares import residuals_at
 from ..instance.terms import parity_sign
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Stop, never, stop_function
 from .box_qp import FreeField, minimise_in_box, stroke_bounds
-from .energy import CLOSE, LinearSolver, energy_at
+from .energy import CLOSE, LinearSolver
 from .nearest_stroke import chamfer_distances, nearest_strokes
 
 FALL: Final = 1e-9  # least fall of the energy, relative to 1 + energy: less may be rounding
@@ -73,7 +74,7 @@ def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough
     for _ in range(_ROUNDS):
         if over():
             break
-        energy = energy_at(state.instance, state.p)
+        energy = residuals_at(state.instance, state.p)
         state.x = minimise_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
         reached = state.energy
         fall = (least - reached) / (1 + reached)
@@ -129,11 +130,11 @@ def _turn_trial(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeF
     """The state after turning labels back by `quarters`, solved: strokes pull at the other line."""
     grid, sign = state.instance.grid, parity_sign(quarters)
     trial = FreeField(state.instance, *step_labels(grid, state.alpha, state.beta, state.p, -quarters))
-    energy = energy_at(trial.instance, trial.p)
+    energy = residuals_at(trial.instance, trial.p)
     # In the old labels the system has changed only at these strokes, so that the present factorisation is
     # close.
     old = np.concatenate([np.ones(grid.size), sign])
-    matrix = sparse.diags_array(old) @ energy.matrix @ sparse.diags_array(old)
+    matrix = sparse.diags_array(old) @ energy.normal_matrix @ sparse.diags_array(old)
     trial.x = trial.x + old * solver.step(matrix, -old * energy.slope(trial.x), CLOSE)
     return trial
 

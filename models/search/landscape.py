@@ -35,10 +35,10 @@ from scipy.linalg.blas import dgemm
 from ..instance.angles import HALF
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
+from ..instance.least_squares import residuals_at
+from ..instance.sparse_systems import PULL
 from ..instance.terms import PairTerms, parity_sign
-from ..smooth.sparse_systems import PULL
 from .box_qp import stroke_bounds
-from .energy import energy_at
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)  # changes of one jump in the rows of `gains`
 
@@ -256,11 +256,11 @@ class Landscape:
     def _solve(self) -> None:
         """Compute inverse, angles and energy from the jumps and from the held angles."""
         places = self.patch.unknowns
-        energy = energy_at(self.patch.instance, self.p)
-        rows = energy.matrix[places]
+        energy = residuals_at(self.patch.instance, self.p)
+        rows = energy.normal_matrix[places]
         outside = self._around.copy()
         outside[places] = 0.0
-        right = energy.vector[places] - rows @ outside
+        right = energy.right_side[places] - rows @ outside
         held = list(self._held)
         right[held] += _HOLD * np.array(list(self._held.values()))
         system = rows[:, places].toarray()

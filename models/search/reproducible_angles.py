@@ -16,10 +16,11 @@ import numpy as np
 from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.grid import Grid
+from ..instance.least_squares import Residuals, residuals_at
 from ..orthogonal.energy import OrthogonalEnergy
 from ..processes.blas_threads import one_thread
 from .box_qp import angle_bounds, field_at, fit_in_box
-from .energy import LinearSolver, QuadraticForm, energy_at
+from .energy import LinearSolver
 from .nearest_stroke import nearest_strokes
 
 _DECIMALS: Final = 12  # as in directions of strokes
@@ -50,7 +51,7 @@ def reproducible_field(field: CrossField) -> CrossField:
     """
     instance, start = field.instance, fit_in_box(field)
     lower, upper = angle_bounds(instance)
-    energy, solver = energy_at(instance, field.p), LinearSolver()
+    energy, solver = residuals_at(instance, field.p), LinearSolver()
     unreached = np.zeros(len(lower), dtype=bool)
     if isinstance(instance.domain, Grid):
         unreached = np.tile(nearest_strokes(instance) < 0, 2)
@@ -60,7 +61,7 @@ def reproducible_field(field: CrossField) -> CrossField:
     for _ in range(_MOST_STEPS):
         slope = _slope(energy, x, rest)
         held = unreached | ((x <= lower) & (slope > 0)) | ((x >= upper) & (slope < 0))
-        step = solver.step(energy.matrix, -slope, _LINEAR, ~held)
+        step = solver.step(energy.normal_matrix, -slope, _LINEAR, ~held)
         moved = np.clip(x + (rest + step), lower, upper)
         inside = (moved > lower) & (moved < upper)
         x, rest = moved, np.where(inside, (rest + step) - (moved - x), 0.0)
@@ -71,12 +72,12 @@ def reproducible_field(field: CrossField) -> CrossField:
     return field_at(instance, x, field.p)
 
 
-def _slope(energy: QuadraticForm, x: Floats, rest: Floats) -> Floats:
+def _slope(energy: Residuals, x: Floats, rest: Floats) -> Floats:
     """Half the gradient at x + rest, shapes (2n,), each entry rounded once."""
-    matrix = energy.matrix
+    matrix = energy.normal_matrix
     product, error = _two_product(matrix.data, x[matrix.indices])
     terms = np.stack([product, error, matrix.data * rest[matrix.indices]], axis=1).ravel().tolist()
-    ends, vector = (3 * matrix.indptr).tolist(), energy.vector.tolist()
+    ends, vector = (3 * matrix.indptr).tolist(), energy.right_side.tolist()
     rows = zip(ends[:-1], ends[1:], vector, strict=True)
     return np.array([math.fsum([*terms[begin:end], -goal]) for begin, end, goal in rows])
 

@@ -18,14 +18,15 @@ from ..field.field import CrossField
 from ..field.fusion import fuse_fields
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
+from ..instance.least_squares import residuals_at
+from ..instance.sparse_systems import solve_locally
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
-from ..smooth.sparse_systems import solve_locally
 from .box_qp import FreeField, fit_in_box, stroke_bounds
 from .coarse_grid import copy_to_fine_grid, halve_resolution
-from .energy import LinearSolver, energy_at
+from .energy import LinearSolver
 from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle
 from .integer_fields import first_integer_field
@@ -136,8 +137,10 @@ def _settle_roughly(state: FreeField) -> None:
     """Update angles and jumps, accurately enough to compare regions; the smooth part needs no comparison."""
     bounds = stroke_bounds(state.instance)
     for _ in range(_HASTE):
-        energy = energy_at(state.instance, state.p)
-        state.x = np.clip(state.x + solve_locally(energy.matrix, -energy.slope(state.x), _HASTY), *bounds)
+        energy = residuals_at(state.instance, state.p)
+        state.x = np.clip(
+            state.x + solve_locally(energy.normal_matrix, -energy.slope(state.x), _HASTY), *bounds
+        )
         state.p = free_jumps(state.instance, state.alpha, state.beta)[0]
 
 

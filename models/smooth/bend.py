@@ -7,7 +7,7 @@ direction changes little from one to the next.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final
 
@@ -21,6 +21,7 @@ from ..field.field import CrossField
 from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.domain import Floats, Ints
 from ..instance.grid import Grid
+from ..instance.least_squares import Residuals, two_entry_matrix
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Stop, stop_function
 from .two_levels import approximate_inverse
@@ -114,46 +115,38 @@ def tremble(field: CrossField) -> float:
 
 @dataclass(frozen=True, eq=False)
 class _Bend:
-    """The energy of line angles x = (u, v), shape (2n,), as squares: bend, and linear ones (rows x - goal).
+    """The energy of line angles x = (u, v), (2n,), as squares: bend, and residuals that are linear in x.
 
     links are the lines, as places in x, that the jumps of m pairs compare: (2m,) of first pixels, and of
-    second ones. difference x - offset are the differences of pairs, (2m,): row e for u of the first pixel of
-    pair e, row m + e for its v. Bend has a square for each quadrant (pixel, line, a horizontal and a vertical
+    second ones. differences are those of the lines of pairs, (2m,): row e for u of the first pixel of pair e,
+    row m + e for its v. Bend has a square for each quadrant (pixel, line, a horizontal and a vertical
     neighbour):
     across (q,) is the place in x of the pixel's other line, sideways and upward (q,) are rows of differences.
     """
 
     grid: Grid
     links: tuple[Ints, Ints]
-    difference: Any
-    offset: Floats
+    differences: Residuals
     across: _Places
     sideways: _Places
     upward: _Places
-    rows: Any
-    goal: Floats
+    linear: Residuals
 
     @classmethod
     def of(cls, start: CrossField, harmonic: float, hold: float) -> _Bend:
         """The energy with the jumps and stroke lines of a field."""
-        links, difference, offset = _differences(start)
-        carried, theta, weight = _strokes(start, hold)
-        squared, every = np.sqrt(weight), sparse.eye_array(start.instance.grid.size)
-        strokes = sparse.csr_array(
-            (squared, (np.arange(len(carried)), carried)), shape=(len(carried), difference.shape[1])
+        links, differences = _differences(start)
+        size, m = start.instance.grid.size, len(start.p)
+        pixels = np.arange(size, dtype=np.int32)
+        # beta is half of u - v + pi/2.
+        skew = Residuals(
+            two_entry_matrix(pixels, pixels + size, 2 * size, 0.5, -0.5),
+            np.full(size, QUARTER),
+            np.full(size, start.instance.skew_coefficient),
         )
-        even, skew = np.sqrt(2 * harmonic), np.sqrt(start.instance.skew_coefficient)
-        rows = [even * difference, strokes, skew / 2 * sparse.hstack([every, -every])]
-        goal = [even * offset, squared * theta, np.full(every.shape[0], -skew * QUARTER)]
-        return cls(
-            start.instance.grid,
-            links,
-            difference,
-            offset,
-            *_quadrants(start),
-            sparse.vstack(rows).tocsr(),
-            np.concatenate(goal),
-        )
+        even = replace(differences, weight=np.full(2 * m, 2 * harmonic))
+        linear = Residuals.join([even, _stroke_residuals(start, hold), skew])
+        return cls(start.instance.grid, links, differences, *_quadrants(start), linear)
 
     def least(self, x: Floats, inverse: LinearOperator, over: Over, fall: float) -> Floats:
         """Angles of low energy, in rounds that begin at x and end with one that removes less than `fall`."""
@@ -173,27 +166,22 @@ class _Bend:
     def at(self, x: Floats) -> tuple[float, Floats, Any]:
         """The energy at x, half its slope for fixed unit vectors, and the matrix of these."""
         along = self._along(x)
-        bend, linear = along @ (self.difference @ x - self.offset), self.rows @ x - self.goal
-        slope = self.difference.T @ (along.T @ bend) + self.rows.T @ linear
-        return float(np.sum(bend**2) + np.sum(linear**2)), slope, along
-
-    @cached_property
-    def squares(self) -> Any:
-        """The matrix (2n, 2n) of the linear squares."""
-        return (self.rows.T @ self.rows).tocsr()
+        bend = along @ self.differences.at(x)
+        slope = self.differences.matrix.T @ (along.T @ bend) + self.linear.slope(x)
+        return float(np.sum(bend**2)) + self.linear.energy(x), slope, along
 
     def invert(self, x: Floats) -> LinearOperator:
         """The approximate inverse of the system for the unit vectors at x."""
-        bend = self._along(x) @ self.difference
-        matrix = bend.T @ bend + self.squares
+        bend = self._along(x) @ self.differences.matrix
+        matrix = bend.T @ bend + self.linear.normal_matrix
         return LinearOperator(matrix.shape, approximate_inverse(matrix, self.grid, *self.links), dtype=float)
 
     def _step(self, along: Any, slope: Floats, inverse: LinearOperator, residual: float) -> Floats:
         """Minus the step to about the least energy for fixed unit vectors, by conjugate gradients."""
 
         def product(v: Floats) -> Floats:
-            bend = self.difference.T @ (along.T @ (along @ (self.difference @ v)))
-            total: Floats = bend + self.squares @ v
+            matrix = self.differences.matrix
+            total: Floats = matrix.T @ (along.T @ (along @ (matrix @ v))) + self.linear.normal_matrix @ v
             return total
 
         times = LinearOperator(inverse.shape, product, dtype=np.float64)
@@ -204,7 +192,7 @@ class _Bend:
         """The matrix (q, 2m) from differences to derivatives along the other line; a quadrant counts 1/4."""
         count, vectors = len(self.across), np.stack([np.cos(x), np.sin(x)], axis=1) / 2
         parts = vectors[self.across].ravel()
-        return sparse.csr_array((parts, *self._structure), shape=(count, len(self.offset)))
+        return sparse.csr_array((parts, *self._structure), shape=(count, len(self.differences.constant)))
 
     @cached_property
     def _structure(self) -> tuple[_Places, _Places]:
@@ -213,17 +201,16 @@ class _Bend:
         return columns, np.arange(0, len(columns) + 1, 2)
 
 
-def _differences(field: CrossField) -> tuple[tuple[Ints, Ints], Any, Floats]:
-    """Links, difference and offset of `_Bend`: the differences -(A + B) and -(A - B) of lines."""
+def _differences(field: CrossField) -> tuple[tuple[Ints, Ints], Residuals]:
+    """Links and differences of `_Bend`: -(A + B) and -(A - B) of pairs, each of weight 1."""
     grid, size, pairs = field.instance.grid, field.instance.grid.size, len(field.p)
     odd = field.p & 1
     first = np.concatenate([grid.first, grid.first + size])
     second = np.concatenate([grid.second + size * odd, grid.second + size * (1 - odd)])
-    values, row = np.ones(2 * pairs), np.arange(2 * pairs)
-    places = (np.concatenate([row, row]), np.concatenate([second, first]))
-    matrix = sparse.csr_array((np.concatenate([values, -values]), places), shape=(2 * pairs, 2 * size))
     terms = field.instance.pair_terms
-    return (first, second), matrix, np.concatenate([terms.offset(field.p + odd), terms.offset(field.p - odd)])
+    offset = np.concatenate([terms.offset(field.p + odd), terms.offset(field.p - odd)])
+    matrix = two_entry_matrix(second, first, 2 * size)
+    return (first, second), Residuals(matrix, -offset, np.ones(2 * pairs))
 
 
 def _quadrants(field: CrossField) -> tuple[_Places, _Places, _Places]:
@@ -251,12 +238,13 @@ def _rows_of(field: CrossField, chosen: NDArray[np.bool_]) -> tuple[_Places, _Pl
     return begin, end
 
 
-def _strokes(field: CrossField, hold: float) -> tuple[Ints, Floats, Floats]:
-    """The nearer line to each stroke, as a place in x, the stroke's nearest angle, and its weight; (s,)."""
+def _stroke_residuals(field: CrossField, hold: float) -> Residuals:
+    """The deviation of the nearer line of `field` from each stroke at its nearest angle."""
     instance = field.instance
     at = instance.stroke_index
     lines = np.stack([field.u_angle[at], field.v_angle[at]])
     off = wrap(instance.theta - lines, -HALF, np.pi)
     carrying = np.argmin(np.round(np.abs(off), 9), axis=0)
     angle = (lines + off)[carrying, np.arange(len(at))]
-    return at + instance.grid.size * carrying, angle, hold * instance.stroke_coefficient * instance.w
+    matrix = sparse.eye_array(2 * instance.grid.size, format="csr")[at + instance.grid.size * carrying]
+    return Residuals(matrix, -angle, hold * instance.stroke_terms.weight)

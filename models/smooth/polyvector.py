@@ -22,8 +22,9 @@ from ..instance.angles import HALF
 from ..instance.domain import Floats
 from ..instance.grid import Grid
 from ..instance.instance import Instance
+from ..instance.least_squares import Residuals, two_entry_matrix
+from ..instance.sparse_systems import Solve, factor_matrix, solve_locally
 from ..processes.blas_threads import one_thread
-from .sparse_systems import Solve, factor_matrix, smoothness, solve_locally
 from .two_levels import FEW, approximate_inverse
 
 _Complex = NDArray[np.complex128]
@@ -93,7 +94,7 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
     def sums(values: _Complex) -> _Complex:
         return strokes.at_points(values.real, size) + 1j * strokes.at_points(values.imag, size)
 
-    alike = smoothness(instance) + sparse.diags_array(strokes.at_points(weight, size))
+    alike = _smoothness(instance) + sparse.diags_array(strokes.at_points(weight, size))
     once = sums(weight * root) * (not instance.orthogonal)
     matrix = _couple_coefficients(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
@@ -104,6 +105,18 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
     else:
         x = _solve_large(matrix, right, instance.grid)
     return x[:size], x[size:]
+
+
+def _smoothness(instance: Instance, power: int = 0) -> Any:
+    """The matrix (n, n) of the sum of 2 |z_i exp(i power kappa) - z_j|^2 over pairs, times their weights.
+
+    Real where all frames are alike or power is 0; otherwise Hermitian.
+    """
+    pairs, n = instance.pair_terms, instance.domain.size
+    m = len(pairs.first)
+    turn = 1.0 if pairs.kappa is None or power == 0 else np.exp(1j * power * pairs.kappa)
+    rows = two_entry_matrix(pairs.first, pairs.second, n, turn)
+    return Residuals(rows, np.zeros(m), pairs.weighted(np.full(m, 2.0))).normal_matrix
 
 
 def _solve_large(matrix: Any, right: _Complex, grid: Grid) -> _Complex:
@@ -155,7 +168,7 @@ def power_field(instance: Instance) -> CrossField:
     goal = np.stack(
         [strokes.at_points(strokes.weight * f(4 * instance.theta), size) for f in (np.cos, np.sin)], axis=-1
     )
-    matrix = smoothness(instance, power=4) + sparse.diags_array(instance.point_weight)
+    matrix = _smoothness(instance, power=4) + sparse.diags_array(instance.point_weight)
     solve = factor_matrix(matrix)
     if np.iscomplexobj(matrix):
         z = solve(goal @ np.array([1, 1j]))

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..instance.domain import Ints
 from ..instance.grid import Grid
-from .sparse_systems import PULL, Solve, factor_matrix, nested_dissection_order
+from ..instance.sparse_systems import PULL, Solve, factor_matrix, nested_dissection_order
 
 FEW: Final = 4096  # pixels up to which systems are factored
 _SIDE: Final = 3  # pixels of an aggregate: smoothed ones meet only their eight neighbours

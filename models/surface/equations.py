@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..instance.domain import Bools, Floats, Ints
+from ..instance.least_squares import Residuals
+from ..instance.sparse_systems import SimilarSystems
 from ..processes.deadline import Over
-from ..smooth.sparse_systems import SimilarSystems
 from .stencils import SLOPES, Crosses, Stencils, scale_rows
 
 CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
@@ -41,14 +42,6 @@ class Weights:
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
-    """Squares that are linear in the heights: sum of (matrix z - goal)^2."""
-
-    matrix: Any
-    goal: Floats
-
-
-@dataclass(frozen=True, eq=False)
 class Equations:
     """The energy of heights z (N,) over the crosses at n pixels.
 
@@ -65,7 +58,7 @@ class Equations:
     stencils: Stencils
     crosses: Crosses
     weights: Weights
-    extra: Sequence[Rows] = ()
+    extra: Sequence[Residuals] = ()
 
     @cached_property
     def _lines(self) -> tuple[Floats, Floats]:
@@ -103,11 +96,10 @@ class Equations:
         return sparse.vstack([conjugacy, np.sqrt(self.weights.even * size / 10) * self.stencils.twist])
 
     @cached_property
-    def _linear(self) -> Rows:
-        """All squares that are linear."""
-        matrix = sparse.vstack([self._even, *(rows.matrix for rows in self.extra)]).tocsr()
+    def _linear(self) -> Residuals:
+        """All residuals that are linear."""
         plain = np.zeros(self._even.shape[0])
-        return Rows(matrix, np.concatenate([plain, *(rows.goal for rows in self.extra)]))
+        return Residuals.join([Residuals(self._even, plain, np.ones_like(plain)), *self.extra])
 
     @cached_property
     def _sum(self) -> BlockSum:
@@ -127,7 +119,6 @@ class Equations:
 
     def energy(self, z: Floats) -> float:
         """The energy of heights."""
-        linear = self._linear
         cosine, scale = self.right_angles(z), self.weights.forgiven
         plain = np.isinf(scale)
         loss = np.sum(cosine**2) if plain else scale**2 * np.sum(np.log1p((cosine / scale) ** 2))
@@ -135,23 +126,22 @@ class Equations:
         uneven = sum(normal @ (self.stencils.unevenness @ normal) for normal in normals)
         return float(
             loss
-            + np.sum((linear.matrix @ z - linear.goal) ** 2)
+            + self._linear.energy(z)
             + self.weights.even * normals.shape[1] * uneven
             - 2 * self.weights.facing * np.sum(np.log(normals[2]))
         )
 
     def model(self, z: Floats) -> tuple[Floats, Any]:
         """Half the slope (N,) of the energy at z, and half its curvature (N, N) by Gauss and Newton."""
-        linear = self._linear
         down, angles = self._of_angles(z)
         even, blocks = self._of_normals(z)
         facing = self.weights.facing * normals_of(self.stencils, z)[2] ** 2
         blocks[:, :, : len(facing)] += angles
         blocks[[0, 1], [0, 1], : len(facing)] += facing
-        slope = linear.matrix.T @ (linear.matrix @ z - linear.goal)
+        slope = self._linear.slope(z)
         for matrix, part in zip(self.stencils.slopes, down + even, strict=True):
             slope += matrix.T @ (part + facing * (matrix @ z))
-        extra = (rows.matrix.T @ rows.matrix for rows in self.extra)
+        extra = (hint.normal_matrix for hint in self.extra)
         return slope, sum(extra, self._sum.matrix(blocks))
 
     def _of_angles(self, z: Floats) -> tuple[Floats, Floats]:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..instance.angles import HALF
 from ..instance.domain import Floats
 from ..instance.instance import Instance
-from .equations import Rows
+from ..instance.least_squares import Residuals
 from .stencils import GridLevel
 
 WEIGHT: Final = 0.1  # weight of each pixel of the disc about a hint, whose normals differ a little
@@ -69,13 +69,13 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
             raise InputError(f"{place} has the tilt {hint.tilt}, not a direction; give a finite angle")
 
 
-def hint_rows(hint: Hint, level: GridLevel) -> Rows:
-    """The squares that require the slopes of a hint on a disc of pixels of a level, at least one."""
+def hint_rows(hint: Hint, level: GridLevel) -> Residuals:
+    """The residuals that require the slopes of a hint on a disc of pixels of a level, at least one."""
     grid, (top, left) = level.grid, level.corner
     away = np.hypot(
         grid.rows - ((hint.row - top) >> level.halved), grid.columns - ((hint.column - left) >> level.halved)
     )
     disc = away <= max(1.0, _DISC * np.sqrt(grid.size))
-    weight = np.sqrt(WEIGHT)
-    matrix = sparse.vstack([slope[disc] for slope in level.stencils.slopes])
-    return Rows(weight * matrix, weight * np.repeat(hint.slopes, int(disc.sum())))
+    matrix = sparse.vstack([slope[disc] for slope in level.stencils.slopes], format="csr")
+    goal = np.repeat(hint.slopes, int(disc.sum()))
+    return Residuals(matrix, -goal, np.full(len(goal), WEIGHT))

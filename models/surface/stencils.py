@@ -13,8 +13,8 @@ from scipy import sparse
 from ..field.field import CrossField
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.grid import Grid
+from ..instance.sparse_systems import nested_dissection_order
 from ..smooth.polyvector import roots
-from ..smooth.sparse_systems import nested_dissection_order
 
 SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
 SLOPES: Final = np.array([[-0.5, 0.5, -0.5, 0.5], [0.5, 0.5, -0.5, -0.5]])

@@ -58,14 +58,14 @@ def try_all_integers(instance, span=2):
     """
     energy = OrthogonalEnergy.of(instance)
     free = beyond_forest(energy)
-    inverse = np.linalg.pinv(energy.matrix_of(energy.weight).toarray())
-    rows = energy.rows.toarray()
+    inverse = np.linalg.pinv(energy.weighted_matrix(energy.weight).toarray())
+    rows = energy.matrix.toarray()
     form = np.diag(energy.weight) - (energy.weight[:, None] * rows) @ inverse @ (rows.T * energy.weight)
     begin = energy.nearest(_forest_angles(energy, free))
     steps = np.array([*itertools.product(range(-span, span + 1), repeat=len(free))], int)
     z = np.repeat(begin[None], len(steps), axis=0)
     z[:, free] += steps
-    offsets = energy.offset + np.pi / 2 * z
+    offsets = energy.constant + np.pi / 2 * z
     totals = np.einsum("kr,rq,kq->k", offsets, form, offsets, optimize=True)
     best = int(totals.argmin())
     assert not len(free) or (np.abs(steps[best]) < span).all()
@@ -92,8 +92,8 @@ def beyond_forest(energy):
 def _forest_angles(energy, free):
     tree = np.ones(len(energy.first))
     tree[free] = 0
-    rows = energy.rows.toarray()
-    return np.linalg.lstsq(rows[tree > 0], -energy.offset[tree > 0], rcond=None)[0]
+    rows = energy.matrix.toarray()
+    return np.linalg.lstsq(rows[tree > 0], -energy.constant[tree > 0], rcond=None)[0]
 
 
 def prove_from(instance, z, *, levels=4):

@@ -42,9 +42,9 @@ def test_the_best_angles_have_no_slope(case):
     _, energy, z = case
     alpha = energy.fit_angles(z)
     np.testing.assert_allclose(
-        energy.rows @ alpha + energy.offset + z * np.pi / 2, energy.residuals(alpha, z), atol=1e-9
+        energy.matrix @ alpha + energy.constant + z * np.pi / 2, energy.residuals(alpha, z), atol=1e-9
     )
-    np.testing.assert_allclose(energy.rows.T @ (energy.weight * energy.residuals(alpha, z)), 0.0, atol=1e-9)
+    np.testing.assert_allclose(energy.matrix.T @ (energy.weight * energy.residuals(alpha, z)), 0.0, atol=1e-9)
 
 
 def test_a_field_has_the_energy_of_its_integers(case):

@@ -12,12 +12,12 @@ import pytest
 from cases import make_instance
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import Instance
+from crossfield.models.instance.sparse_systems import factor_matrix
 from crossfield.models.orthogonal import greedy as greedy_module
 from crossfield.models.orthogonal import search as search_module
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, field_of
 from crossfield.models.orthogonal.greedy import find_forest_rows, round_greedily
 from crossfield.models.orthogonal.search import IntegerSearch
-from crossfield.models.smooth.sparse_systems import factor_matrix
 from meshes import (
     box,
     flat_sheet,
@@ -67,7 +67,9 @@ def least_energy(energy):
     """
     tree = spanning_tree(energy)
     weight = np.where(tree, energy.weight, 0.0)
-    alpha = -factor_matrix(energy.matrix_of(weight), pull=0.0)(energy.force(weight, np.zeros(len(tree), int)))
+    alpha = -factor_matrix(energy.weighted_matrix(weight), pull=0.0)(
+        energy.force(weight, np.zeros(len(tree), int))
+    )
     ends = np.zeros((energy.size + 1,) * 2)
     ends[energy.first[tree], energy.second[tree]] = 1
     length = shortest_path(ends, directed=False)[energy.first, energy.second] + 1
@@ -75,12 +77,12 @@ def least_energy(energy):
     lowest = np.where(tree, 0, np.ceil(exact - length / 2)).astype(int)
     highest = np.where(tree, 0, np.floor(exact + length / 2)).astype(int)
     ranges = [range(low, high + 1) for low, high in zip(lowest, highest, strict=True)]
-    rows = energy.rows.toarray()
+    rows = energy.matrix.toarray()
     reduced = np.diag(energy.weight) - (energy.weight[:, None] * rows) @ energy.solve_system(
         np.eye(energy.size)
     ) @ (rows.T * energy.weight)
     z = np.array(list(product(*ranges)))
-    shifted = energy.offset + HALF * z
+    shifted = energy.constant + HALF * z
     return float(np.einsum("kr,rs,ks->k", shifted, reduced, shifted, optimize=True).min())
 
 
@@ -196,7 +198,7 @@ def test_the_rounds_of_greedy_have_the_best_angles_in_between():
     known, z = find_forest_rows(energy), np.zeros(len(energy.first), dtype=np.int32)
     while not known.all():
         weight = energy.weight * known
-        alpha = np.linalg.solve(energy.matrix_of(weight).toarray(), -energy.force(weight, z))
+        alpha = np.linalg.solve(energy.weighted_matrix(weight).toarray(), -energy.force(weight, z))
         turns = np.where(known, np.nan, energy.turns(alpha))
         row = np.nanargmin(np.round(np.abs(turns - np.round(turns)), 9))
         z[row], known[row] = np.round(turns[row]), True

@@ -14,7 +14,7 @@ from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.checkers import check_certificate
 from crossfield.models.proof.checkers.check_certificate import has_forced_jump
 from crossfield.models.proof.descent.last_step import energy_terms
-from crossfield.models.search.angle_program import Residuals, fit_absolute, solve_angle_program
+from crossfield.models.search.angle_program import NormResiduals, fit_absolute, solve_angle_program
 from crossfield.models.search.starts import first_field
 from exhaustive import random_instance
 
@@ -140,7 +140,7 @@ def test_any_multipliers_bound_the_energy_in_a_box(norm):
     field = first_field(instance)
     fitted, _ = fit_absolute(field, norm)
     assert fitted.energy(norm).total <= field.energy(norm).total
-    terms = Residuals.at(instance, field.p, norm)
+    terms = NormResiduals.of(instance, field.p, norm)
     lower = np.concatenate([fitted.alpha, fitted.beta]) - rng.uniform(0, 1, 24)
     upper = lower + rng.uniform(0, 1, 24)
     tilt = rng.normal(0, 0.1, 24)

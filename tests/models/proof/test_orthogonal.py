@@ -124,7 +124,7 @@ def minimise_by_gurobi(instance):
         z[row].lb = z[row].ub = 0
     terms = [
         alpha[i] - (alpha[j] if j < energy.size else 0) + c + np.pi / 2 * z[row]
-        for row, (i, j, c) in enumerate(zip(energy.first, energy.second, energy.offset, strict=True))
+        for row, (i, j, c) in enumerate(zip(energy.first, energy.second, energy.constant, strict=True))
     ]
     model.setObjective(gurobi.quicksum(w * t * t for w, t in zip(energy.weight, terms, strict=True)))
     model.setParam("MIPGap", 1e-6)

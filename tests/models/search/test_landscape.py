@@ -8,9 +8,9 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.field.field import CrossField
+from crossfield.models.instance.least_squares import residuals_at
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.search.box_qp import minimise_in_box, stroke_bounds
-from crossfield.models.search.energy import energy_at
 from crossfield.models.search.improvement import pixel_curves
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
 from crossfield.models.search.search import _Hunt
@@ -104,7 +104,7 @@ def test_a_walk_that_leaves_and_enters_a_soft_state_keeps_its_energy(name, size,
 def unbounded(instance, x, p):
     """The least energy of all angles without bounds, by a solve of the whole system."""
     infinite = np.full(len(x), np.inf)
-    return definition(instance, minimise_in_box(energy_at(instance, p), x, -infinite, infinite), p)
+    return definition(instance, minimise_in_box(residuals_at(instance, p), x, -infinite, infinite), p)
 
 
 def test_the_gain_of_a_turn_is_the_change_of_the_least_energy():

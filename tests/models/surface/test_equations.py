@@ -5,8 +5,9 @@ import itertools
 import crossfield as cf
 import numpy as np
 import pytest
+from crossfield.models.instance.least_squares import Residuals
 from crossfield.models.processes.deadline import never
-from crossfield.models.surface.equations import CONJUGACY, Equations, Rows, Weights, descend
+from crossfield.models.surface.equations import CONJUGACY, Equations, Weights, descend
 from crossfield.models.surface.stencils import Crosses, GridLevel, Stencils, levels_of
 from loops import for_each
 from scipy import sparse
@@ -64,7 +65,7 @@ def test_the_energy_is_as_written():
 
 @for_each("forgiven", [0.1, np.inf])
 def test_the_slope_is_that_of_the_energy_and_the_curvature_is_never_negative(forgiven):
-    goal = Rows(sparse.csr_array(np.ones((1, 25))), np.ones(1))
+    goal = Residuals(sparse.csr_array(np.ones((1, 25))), -np.ones(1), np.ones(1))
     system, z = equations(Weights(1e-3, 1e-2, forgiven), [goal])
     slope, curvature = system.model(z)
     steps = 1e-6 * np.eye(len(z))

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from crossfield.models.smooth.sparse_systems import factor_matrix, nested_dissection_order
+from crossfield.models.instance.sparse_systems import factor_matrix, nested_dissection_order
 from scipy import ndimage, sparse
 
 

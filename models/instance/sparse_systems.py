@@ -1,4 +1,4 @@
-"""Sparse systems of smoothing on the grid: their matrices, and their factorisation."""
+"""Solution of sparse systems: factors, bands, and conjugate gradients."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from scipy import sparse
 from scipy.linalg import solveh_banded
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
-from ..instance.domain import Floats, Ints
-from ..instance.instance import Instance
 from ..processes.blas_threads import one_thread
+from .domain import Floats, Ints
 
 Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 
@@ -23,27 +22,6 @@ _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution woul
 _DENSE: Final = 8  # columns of a dense block in the factors by nested dissection
 _LEAF: Final = 24  # places that are not parted
 _MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
-
-
-def smoothness(instance: Instance, power: int = 0) -> Any:
-    """The sparse matrix (n, n) of 2 |z_i exp(i power kappa) - z_j|^2 over the pairs, times their weights.
-
-    Real where all frames are alike or power is 0: twice the Laplacian of the domain. Otherwise Hermitian.
-    """
-    pairs, n = instance.pair_terms, instance.domain.size
-    weight = pairs.weighted(np.full(len(pairs.first), 2.0))
-    degree = np.bincount(pairs.first, weight, n).astype(np.float64) + np.bincount(pairs.second, weight, n)
-    is_real = pairs.kappa is None or power == 0
-    beside = -weight if is_real else -weight * np.exp(-1j * power * pairs.offset(0))
-    return symmetric_matrix(pairs.first, pairs.second, beside, degree)
-
-
-def symmetric_matrix(row: Ints, column: Ints, beside: np.ndarray[Any, Any], diagonal: Floats) -> Any:
-    """The sparse Hermitian matrix with those entries on one side of the diagonal, each place once."""
-    every = np.arange(len(diagonal), dtype=np.int32)
-    values = np.concatenate([beside, np.conj(beside), diagonal])
-    place = (np.concatenate([row, column, every]), np.concatenate([column, row, every]))
-    return sparse.csr_array((values, place), shape=(len(diagonal), len(diagonal)))
 
 
 def factor_matrix(matrix: Any, order: Ints | None = None, *, pull: float = PULL) -> Solve:
