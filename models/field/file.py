@@ -21,16 +21,14 @@ from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..instance.angles import MOST_ANGLE
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.file import (
-    are_places,
     instance_arrays,
     instance_of_archive,
     instance_of_document,
     instance_to_json,
-    number_table,
 )
 from ..instance.grid import Grid
 from ..instance.instance import Instance
-from ..instance.mesh import MOST_FACES, Mesh
+from ..instance.mesh import Mesh
 from ..storage import read_bytes, replacing
 from ..written_files import FORCE, check_targets, is_unchanged
 from .exchange import TEXT_READERS, TEXT_WRITERS, most_text_bytes, to_obj, to_sings
@@ -45,7 +43,6 @@ _ARCHIVE: Final = {
     "beta": ExpectedArray(1, MAX_GRID**2),
     "p": ExpectedArray(1, 2 * MAX_GRID**2),
 }
-_MOST_JUMP: Final = 1_000_000
 _NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
 SAME: Final = 1e-9  # difference of energies, relative to them plus 1, up to which none is the lower one
 _Entry = TypeVar("_Entry")
@@ -233,8 +230,7 @@ def field_of_json(data: bytes) -> CrossField:
     """Read a field from the bytes of a JSON file. Raises InstanceError with the place in the document."""
     document = parse_json(decode_json(data))
     check_version(document, FORMAT, VERSION)
-    tests = {"pixels": _are_pixels, "faces": _are_faces, "jumps": _are_jumps}
-    checked = check_schema(document, "field", __package__, rows=tests)
+    checked = check_schema(document, "field", __package__)
     instance = _read_embedded(instance_of_document, checked["instance"])
     try:
         if "faces" in checked:
@@ -258,31 +254,6 @@ def _field_on_faces(instance: Instance, document: dict[str, Any]) -> CrossField:
     if not np.array_equal(pairs, [mesh.first, mesh.second]):
         raise InstanceError("$.jumps: lists other pairs of faces than the mesh has; write it again")
     return _make_field(instance, alpha, beta, p)
-
-
-def _are_faces(rows: list[Any]) -> bool:
-    """Whether all rows obey the schema of a face: [alpha, beta]."""
-    return bool(rows) and number_table(rows, 2) is not None
-
-
-def _are_jumps(rows: list[Any]) -> bool:
-    """Whether all rows obey the schema of a jump: [face, face, jump]."""
-    table = number_table(rows, 3)
-    return table is not None and are_places(table[:, :2], MOST_FACES) and _are_jump_numbers(table[:, 2])
-
-
-def _are_pixels(rows: list[Any]) -> bool:
-    """Whether all rows obey the schema of a pixel: [row, column, alpha, beta, jump or null, jump or null]."""
-    if not rows or not all(type(row) is list and len(row) == 6 for row in rows):
-        return False
-    table = number_table([[0 if value is None else value for value in row] for row in rows], 6)
-    if table is None or any(None in row[:4] for row in rows):
-        return False
-    return are_places(table[:, :2]) and _are_jump_numbers(table[:, 4:])
-
-
-def _are_jump_numbers(jumps: Floats) -> bool:
-    return bool((np.abs(jumps) <= _MOST_JUMP).all() and (jumps % 1 == 0).all())
 
 
 def _make_field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:

@@ -7,7 +7,6 @@ and the weights of pairs are written only where they are not the default.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,7 +17,6 @@ from ..documents import check_schema, check_version, decode_json, parse_head, pa
 from ..errors import InstanceError, naming, shortened
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
 from ..storage import read_bytes, require_suffix, write_bytes
-from .domain import Floats
 from .grid import Grid
 from .instance import Instance
 from .mesh import MOST_FACES, Mesh
@@ -165,8 +163,7 @@ def instance_of_document(document: object) -> Instance:
     check_version(document, FORMAT, VERSION)
     assert isinstance(document, dict)
     on_mesh = "vertices" in document
-    tests = {"pair_weights": _are_weights} | (_MESH_ROWS if on_mesh else _GRID_ROWS)
-    checked = check_schema(document, "instance", __package__, rows=tests)
+    checked = check_schema(document, "instance", __package__)
     more = {name: checked[key] for key, name in _SCALARS.items() if key in checked}
     if "pair_weights" in checked:
         more["pair_weights"] = checked["pair_weights"]
@@ -215,48 +212,6 @@ def check_counts(strokes: int, pixels: int) -> None:
         raise InstanceError(
             f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each once"
         )
-
-
-def _table_test(test: Callable[[Floats], bool], width: int = 3) -> Callable[[list[Any]], bool]:
-    """Whether rows are tables of numbers of this width that pass a test."""
-    return lambda rows: (table := number_table(rows, width)) is not None and test(table)
-
-
-def _are_strokes(table: Floats, places: int = MAX_GRID) -> bool:
-    """Whether rows [row, column, theta, w] or [face, theta, w] obey the schema of a stroke."""
-    w = table[:, -1]
-    return are_places(table[:, :-2], places) and bool(((w > 0) & (w <= 1)).all())
-
-
-_GRID_ROWS: Final = {"strokes": _table_test(_are_strokes, 4)}
-_MESH_ROWS: Final = {
-    "vertices": _table_test(lambda _: True),
-    "faces": _table_test(lambda table: are_places(table, _MOST_VERTICES)),
-    "strokes": _table_test(lambda table: _are_strokes(table, _MOST_VERTICES)),
-}
-
-
-def _are_weights(values: list[Any]) -> bool:
-    """Whether all values are positive numbers."""
-    table = number_table([values], len(values))
-    return table is not None and bool((table > 0).all())
-
-
-def are_places(numbers: Floats, places: int = MAX_GRID) -> bool:
-    """Whether all numbers are whole, from 0 to fewer than `places`."""
-    return bool(((numbers >= 0) & (numbers < places)).all() and (numbers % 1 == 0).all())
-
-
-def number_table(rows: list[Any], width: int) -> Floats | None:
-    """Rows of numbers as an array (k, width), None when an entry is something else."""
-    if not all(type(row) is list and len(row) == width for row in rows):
-        return None
-    if not {type(value) for row in rows for value in row} <= {int, float}:
-        return None
-    try:
-        return np.array(rows, dtype=np.float64).reshape(-1, width)
-    except OverflowError:
-        return None
 
 
 def instance_arrays(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
