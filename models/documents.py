@@ -66,6 +66,15 @@ def read_document(
         return check_schema(document, schema, package)
 
 
+def stated_format(path: Path) -> object:
+    """The format that a JSON document in a file states; None for other content. Raises InputError."""
+    try:
+        document = json.loads(read_bytes(path, MAX_BYTES))
+    except (ValueError, RecursionError):
+        return None
+    return document.get("format") if isinstance(document, dict) else None
+
+
 def _check_writable(document: object) -> None:
     """Raise InstanceError unless the document can be written as JSON in UTF-8 again."""
     try:  # Python reads infinite numbers and halves of surrogate pairs, other programs need not

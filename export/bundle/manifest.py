@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
@@ -10,7 +11,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.documents import read_document
-from ...models.errors import CrossfieldError, FormulationError, InstanceError
+from ...models.errors import CrossfieldError, InstanceError, naming
 from ...models.formulations.problem import Problem, formulate, with_windows
 from ...models.formulations.windows import Windows
 from ...models.instance.domain import Ints
@@ -22,6 +23,8 @@ from ..solvers_table import smallest_problem, suitabilities
 from ..writing.canonical import CanonicalForm
 
 FORMAT: Final = "crossfield-manifest"
+ENTRY_FORMAT: Final = "crossfield-library-entry"
+"""Format of the sidecars of a library, which describe a problem too."""
 VERSION: Final = 1
 LARGE: Final = 1 << 16
 """Instances of more pixels are written as .npz instead of JSON."""
@@ -48,35 +51,10 @@ class Manifest:
         """The manifest after its set has moved to another folder."""
         return Manifest(self.document, Path(folder) / self.path.name)
 
-    def instance(self) -> Instance:
-        """The instance next to the manifest. Raises InputError, and InstanceError for another instance."""
-        path = self.folder / self.document["instance"]["file"]
-        instance = read_instance(path)
-        if instance.sha256 != self.document["instance"]["sha256"]:
-            raise InstanceError(
-                "is another instance than the one the manifest was written for; export again", file=path
-            )
-        return instance
-
     def problem(self) -> Problem:
         """The problem that the files hold. Raises InputError, InstanceError, FormulationError."""
-        instance = self.instance()
-        try:
-            problem = narrow_windows(
-                formulate(
-                    instance,
-                    self.formulation,
-                    p=jumps_of_list(self.document["jumps"], instance, self.path),
-                    **self.document["options"],
-                ),
-                self._windows,
-            )
-        except FormulationError as error:
-            raise FormulationError(str(error), file=self.path) from error
-        if problem.sha256 != self.document["sha256"]:
-            raise InstanceError(
-                "does not fit its own instance, options and jumps; export again", file=self.path
-            )
+        windows = Windows.of_document(self.document["windows"]) if "windows" in self.document else None
+        problem = described_problem(self.document, self.path, lambda _: windows)
         if self.document["columns"] != _column_blocks(problem):
             raise InstanceError(
                 "lists columns in another order than they have today; export again", file=self.path
@@ -90,9 +68,28 @@ class Manifest:
             for file in self.document["files"]
         }
 
-    @property
-    def _windows(self) -> Windows | None:
-        return Windows.of_document(self.document["windows"]) if "windows" in self.document else None
+
+def described_problem(
+    document: dict[str, Any], path: Path, windows_of: Callable[[Instance], Windows | None]
+) -> Problem:
+    """The problem that a manifest or the sidecar of an entry describes, on the instance beside it.
+
+    path: of the document. windows_of: narrower windows of the problem on its instance. Raises InputError,
+    InstanceError for another instance or problem, and FormulationError.
+    """
+    file = path.parent / document["instance"]["file"]
+    instance = read_instance(file)
+    if instance.sha256 != document["instance"]["sha256"]:
+        raise InstanceError(
+            f"is another instance than the one that {path.name} was written for; write both again", file=file
+        )
+    with naming(path):
+        jumps = _jumps_of_list(document["jumps"], instance)
+        problem = formulate(instance, document["formulation"], p=jumps, **document["options"])
+        problem = with_windows(problem, windows_of(instance))
+        if problem.sha256 not in (document.get("sha256"), document.get("problem_sha256")):
+            raise InstanceError("does not fit its own instance, options and jumps; write it again")
+    return problem
 
 
 def read_manifest(path: str | Path) -> Manifest:
@@ -169,11 +166,6 @@ def instance_file(instance: Instance) -> str:
     return f"{instance.name}.instance.{'npz' if instance.domain.size > LARGE else 'json'}"
 
 
-def narrow_windows(problem: Problem, windows: Windows | None) -> Problem:
-    """The problem with narrower windows, if there are any."""
-    return problem if windows is None else with_windows(problem, windows)
-
-
 def manifest_document(problem: Problem, written: list[Written], refused: dict[str, str]) -> dict[str, Any]:
     """The document of a problem's files. refused: reasons by format."""
     instance, formulation = problem.instance, problem.formulation
@@ -243,15 +235,13 @@ def nonzero_jumps(problem: Problem) -> list[list[int]] | None:
     return listed
 
 
-def jumps_of_list(listed: list[list[int]] | None, instance: Instance, path: Path) -> Ints | None:
-    """The jumps that `nonzero_jumps` listed. Raises InstanceError, about a file, for an unknown pair."""
+def _jumps_of_list(listed: list[list[int]] | None, instance: Instance) -> Ints | None:
+    """The jumps that `nonzero_jumps` listed. Raises InstanceError for an unknown pair."""
     if listed is None:
         return None
     jumps = np.zeros(len(instance.domain.first), dtype=np.int32)
     pairs, values = np.array(listed, dtype=np.int64).reshape(-1, 2).T
     if (pairs >= len(jumps)).any():
-        raise InstanceError(
-            "lists a jump of a pair that the instance does not have; write it again", file=path
-        )
+        raise InstanceError("lists a jump of a pair that the instance does not have; write it again")
     jumps[pairs] = values
     return jumps

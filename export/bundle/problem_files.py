@@ -20,7 +20,7 @@ from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.catalogue import declaration_of, declare, list_formulations
 from ...models.formulations.declaration import Declaration, Formulation, Options
-from ...models.formulations.problem import Problem, formulate
+from ...models.formulations.problem import Problem, formulate, with_windows
 from ...models.formulations.windows import Windows
 from ...models.instance.domain import Ints
 from ...models.instance.instance import Instance
@@ -28,7 +28,7 @@ from ...models.processes.deadline import Progress, silent
 from ...models.storage import replace_results
 from ..formats.registry import DEFAULTS, FORMATS, file_names, problem_in_format, write
 from ..solvers_table import smallest_problem
-from .manifest import LARGE, Manifest, file_stem, instance_file, narrow_windows, write_manifest
+from .manifest import LARGE, Manifest, file_stem, instance_file, write_manifest
 from .starts import STARTS, start_name, write_starts
 
 
@@ -168,9 +168,8 @@ def write_all(
         for declaration in declarations:
             progress(declaration.name)
             jumps = jumps_as_data(instance, declaration.name, jumps_of or start)
-            problem = narrow_windows(
-                formulate(instance, declaration.name, p=jumps, **chosen(declaration)), windows
-            )
+            problem = formulate(instance, declaration.name, p=jumps, **chosen(declaration))
+            problem = with_windows(problem, windows)
             manifests.append(
                 _write_problem_files(problem, new.path, formats, start, dialects or {}, compress=compress)
             )

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
 from ...models.arguments import check_choice
-from ...models.errors import CrossfieldError, InputError, InstanceError
+from ...models.errors import CrossfieldError, InputError
 from ...models.storage import require_suffix
 from ...models.written_files import check_targets
 from .mesh_options import check_domain
@@ -33,16 +33,14 @@ def read_described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] |
 
     Raises InputError, InstanceError for a missing or damaged file.
     """
-    from ..bundle.manifest import read_manifest
+    from ...models.documents import stated_format
+    from ..bundle.manifest import ENTRY_FORMAT, read_manifest
 
-    try:
-        manifest = read_manifest(path)
-    except InstanceError:
-        from ..library.documents.documents import is_sidecar, problem_of, read_sidecar
+    if stated_format(path) == ENTRY_FORMAT:
+        from ..library.documents.documents import problem_of, read_sidecar
 
-        if is_sidecar(path):
-            return problem_of(path.parent, read_sidecar(path)), None
-        raise
+        return problem_of(path.parent, read_sidecar(path)), None
+    manifest = read_manifest(path)
     problem = manifest.problem()
     return problem, manifest.problems_by_format(problem)
 

@@ -558,8 +558,8 @@ def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
     return replace(problem, pinned=field)
 
 
-def with_windows(problem: Problem, windows: Windows) -> Problem:
-    """The same problem with narrower windows of alpha and beta and ranges of jumps.
+def with_windows(problem: Problem, windows: Windows | None) -> Problem:
+    """The same problem with narrower windows of alpha and beta and ranges of jumps; None: the gauge's.
 
     Raises InstanceError for windows that are not within the windows of its gauge.
     """

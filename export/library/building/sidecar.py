@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ....models.formulations.problem import Problem
-from ...bundle.manifest import nonzero_jumps
+from ...bundle.manifest import ENTRY_FORMAT, nonzero_jumps
 from ...writing.curvature import probtype
 from ..documents.citation import REFERENCES
-from ..documents.documents import FORMAT, VERSION
+from ..documents.documents import VERSION
 from ..documents.statistics import problem_counts, problem_curvature
 from ..ledger.points import BestPoint
 from ..plan.equivalence import equivalent_entries
@@ -37,7 +37,7 @@ def sidecar_of(
     points = {file["dialect"]: file["name"] for file in listed if file["format"] == "sol"}
     numbers = {key: facts.pop(key) for key in ("objective", "violation", "integrality")}
     return {
-        "format": FORMAT,
+        "format": ENTRY_FORMAT,
         "version": VERSION,
         "name": task.name,
         **inherited,

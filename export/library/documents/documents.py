@@ -14,16 +14,16 @@ from pathlib import Path
 from typing import Any, Final
 
 from ....models.documents import read_document
-from ....models.errors import CrossfieldError, InputError, InstanceError
-from ....models.formulations.problem import Problem, formulate, with_windows
-from ....models.instance.file import read_instance
+from ....models.errors import CrossfieldError, InputError
+from ....models.formulations.problem import Problem, with_windows
+from ....models.formulations.windows import Windows
+from ....models.instance.instance import Instance
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.proof.tightening import remaining_windows
 from ....models.storage import read_bytes
-from ...bundle.manifest import jumps_of_list
+from ...bundle.manifest import ENTRY_FORMAT, described_problem
 from ..plan.spec import Spec, spec_of
 
-FORMAT: Final = "crossfield-library-entry"
 INDEX_FORMAT: Final = "crossfield-library"
 ABOUT_FORMAT: Final = "crossfield-library-instance"
 VERSION: Final = 1
@@ -86,22 +86,13 @@ def read_library(folder: str | Path) -> Library:
 
 def read_sidecar(path: str | Path) -> dict[str, Any]:
     """Read the sidecar in a file. Raises InputError, or InstanceError if it breaks its schema."""
-    return _read(Path(path), FORMAT, "library-entry")
+    return _read(Path(path), ENTRY_FORMAT, "library-entry")
 
 
 def load_document(path: Path) -> dict[str, Any]:
     """Read a document of a build that has just written or checked it, without its schema."""
     document: dict[str, Any] = json.loads(read_bytes(path))
     return document
-
-
-def is_sidecar(path: Path) -> bool:
-    """Whether a JSON file states the format of sidecars; False for other content."""
-    try:
-        document = json.loads(read_bytes(path))
-    except (ValueError, RecursionError):
-        return False
-    return isinstance(document, dict) and document.get("format") == FORMAT
 
 
 def read_about(path: str | Path) -> dict[str, Any]:
@@ -129,20 +120,13 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
     Raises InputError, InstanceError if the instance is missing, damaged or another one.
     """
     folder = library.folder if isinstance(library, Library) else Path(library)
-    path = folder / document["instance"]["file"]
-    instance = read_instance(path)
-    jumps = jumps_of_list(document["jumps"], instance, folder / f"{document['name']}.json")
-    problem = formulate(instance, document["formulation"], p=jumps, **document["options"])
-    if "tightened" in document:
-        problem = tightened_by(
-            read_certificate(folder / document["tightened"]["certificate"], on=instance), problem
-        )
-    if problem.sha256 != document["problem_sha256"]:
-        raise InstanceError(
-            f"is not the instance that {document['name']}.json was made from; build the library again",
-            file=path,
-        )
-    return problem
+
+    def windows_of(instance: Instance) -> Windows | None:
+        if "tightened" not in document:
+            return None
+        return remaining_windows(read_certificate(folder / document["tightened"]["certificate"], on=instance))
+
+    return described_problem(document, folder / f"{document['name']}.json", windows_of)
 
 
 def tightened_by(certificate: Certificate, problem: Problem) -> Problem:
