@@ -59,6 +59,18 @@ LARGEST: Final = 1e8
 class Solution:
     """A solver's answer: its point, its claims, and the values recomputed from the instance.
 
+    Six attributes state what the claims are worth:
+
+    - `claimed`: the status that the file or the program states
+    - `contradictions`: what the recomputed values contradict; empty if they agree with all claims
+    - `is_trusted`: whether status and bound hold, because the file states the problem and nothing contradicts
+    - `status`: what remains of `claimed`, as far as a bound proves it
+    - `doubt`: why the point cannot be used, so that no field is written; empty if it can
+    - `caveat`: which claim is not kept although the point can be used, or is not proven; empty if none
+
+    `remedy` is the likely explanation of a doubt. The other results refer to this one: a `Candidate` of a run
+    holds it with its field, a `Check` of `verify` judges it, and a `Record` of a ledger lists it.
+
     Parameters
     ----------
     problem
@@ -66,7 +78,7 @@ class Solution:
     point
         Values of all columns, shape (n,), or None.
     claimed
-        Status that the file claims. `status` is what remains of it after the point was checked.
+        Status that the file claims.
     message
         The solver's own words.
     reader
