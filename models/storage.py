@@ -5,11 +5,13 @@ Nothing replaces a file that crossfield has not written or that has changed sinc
 
 from __future__ import annotations
 
+import errno
 import os
 import secrets
 import shutil
 import stat
 import sys
+import tempfile
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
@@ -25,6 +27,7 @@ from .errors import CrossfieldError, InputError, OutputError
 from .written_files import MARK, add_to_list, check_targets, is_unchanged, reason_of, sha256_of
 
 _UNFINISHED: Final[set[Path]] = set()
+_FULL: Final = {errno.ENOSPC, errno.EDQUOT}
 _LONGEST: Final = 50  # characters of a name that a neighbour's name repeats, at most 200 of 255 bytes
 
 
@@ -52,6 +55,24 @@ def replacing(
         except OSError as error:
             raise OutputError(
                 f"cannot be written: {reason_of(error)}; free some space or choose another folder", file=path
+            ) from error
+
+
+@contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """A folder for the time of the block. Raises OutputError where the disk of temporary files is full."""
+    with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as name:
+        try:
+            yield Path(name).resolve()
+        except OSError as error:
+            # A copy names its source first; a stream that is written to has no name.
+            written = error.filename2 or error.filename or name
+            if error.errno not in _FULL or not Path(written).is_relative_to(name):
+                raise
+            raise OutputError(
+                f"has no room for temporary files ({reason_of(error)}); free some space, or set TMPDIR to "
+                "another folder",
+                file=tempfile.gettempdir(),
             ) from error
 
 

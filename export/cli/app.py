@@ -380,6 +380,6 @@ def _error_line(error: Exception) -> str:
         return "there is not enough memory; choose a smaller --size or a coarser mesh"
     if isinstance(error, OSError):
         reason = (error.strerror or str(error)).lower()
-        return f"{error.filename or 'a file'}: {reason}; check the path and the free space"
+        return f"{error.filename2 or error.filename or 'a file'}: {reason}; check the path and the free space"
     reason = f"{type(error).__name__}: {shortened(error)}"
     return f"internal error, please report it: {reason} (crossfield --debug ... shows the traceback)"

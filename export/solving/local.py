@@ -6,10 +6,9 @@ which is read like any external solution file. So a solve tests the files too.
 
 from __future__ import annotations
 
-import tempfile
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Iterable
+from contextlib import ExitStack
 from dataclasses import replace
 from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as installed
@@ -36,7 +35,7 @@ from ...models.processes.child import Child, KilledError
 from ...models.processes.child_program import WorkerError
 from ...models.processes.deadline import Deadline, Progress, Stop, silent, stop_function
 from ...models.processes.limits import Limits
-from ...models.storage import make_folder, replace_results
+from ...models.storage import make_folder, replace_results, temporary_folder
 from ..bundle.earlier import keep_better_answer, keep_better_field, objective_function
 from ..bundle.manifest import add_to_manifest, file_stem, instance_file
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
@@ -203,7 +202,7 @@ class Solvers:
 
     def __enter__(self) -> Self:
         """Create the folder for the programs' own files."""
-        self._folder = Path(self._stack.enter_context(_open_folder()))
+        self._folder = Path(self._stack.enter_context(temporary_folder()))
         return self
 
     def __exit__(self, *_: object) -> None:
@@ -280,7 +279,7 @@ class Solvers:
             return self.solve_file(written.problem, solver, files, limits, search, start=start, stop=stop)
 
         if folder is None:
-            with _open_folder() as place:
+            with temporary_folder() as place:
                 return solve_in(place)
         names = names_of_solve(problem.instance, problem.name, solver, [taking.name])
         (log_name, solution_name), failure = names[-2:], None
@@ -378,13 +377,6 @@ class Solvers:
             seconds=time.perf_counter() - begin,
             start_returned=_is_start(solution.point, point),
         )
-
-
-@contextmanager
-def _open_folder() -> Iterator[Path]:
-    """A folder that is deleted afterwards."""
-    with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as temporary:
-        yield Path(temporary).resolve()
 
 
 def names_of_solve(instance: Instance, name: str, solver: str, forms: Iterable[str]) -> list[str]:

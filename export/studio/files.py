@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from ...models.arguments import check_choice
 from ...models.errors import InputError
 from ...models.field.file import write_field
 from ...models.instance.file import write_instance
+from ...models.storage import temporary_folder
 from ..bundle.problem_files import write_all
 from ..pictures.draw import draw
 from ..pictures.underlay import read_underlay
@@ -61,22 +61,22 @@ def _stroke_svg(stroke: Stroke, thick: float) -> str:
 
 
 def _write_layers(document: Document, folder: Path, *_: str) -> None:
-    with tempfile.TemporaryDirectory() as temporary:
-        underlay = _write_drawing(document, Path(temporary))
+    with temporary_folder() as temporary:
+        underlay = _write_drawing(document, temporary)
         draw(compute_field(document)[1], folder / f"{document.name}.layers.svg", underlay=underlay)
 
 
 def _write_normals(document: Document, folder: Path, *_: str) -> None:
     solid = compute_surface(document, compute_field(document)[1])
-    with tempfile.TemporaryDirectory() as temporary:
-        underlay = read_underlay(_write_drawing(document, Path(temporary)), on=solid.instance)
+    with temporary_folder() as temporary:
+        underlay = read_underlay(_write_drawing(document, temporary), on=solid.instance)
     [picture] = paint_surface(solid, underlay, view_of_box(document.page), colour_normals)
     (folder / f"{document.name}.normals.png").write_bytes(encode_png(picture))
 
 
 def _write_surface(document: Document, folder: Path, *_: str) -> None:
-    with tempfile.TemporaryDirectory() as temporary:
-        underlay = _write_drawing(document, Path(temporary))
+    with temporary_folder() as temporary:
+        underlay = _write_drawing(document, temporary)
         write_surface(compute_surface(document, compute_field(document)[1]), folder, drawing=underlay)
 
 
@@ -119,8 +119,7 @@ def download(data: bytes, kind: str, formulation: str = "", form: str = "") -> t
     """Name and content of the file of an entry; several files are one archive. Raises InputError."""
     check_choice("download", kind, DOWNLOADS)
     document = Document.from_bytes(data)
-    with tempfile.TemporaryDirectory(prefix="crossfield-") as name:
-        folder = Path(name)
+    with temporary_folder() as folder:
         DOWNLOADS[kind].write(document, folder, formulation, form)
         files = sorted(path for path in folder.rglob("[!.]*") if path.is_file())
         if len(files) == 1:

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import shutil
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -29,7 +28,7 @@ from ...models.orthogonal.energy import OrthogonalEnergy, field_of, integers_of
 from ...models.packed import unpack
 from ...models.processes.deadline import Deadline
 from ...models.processes.limits import Limits
-from ...models.storage import read_bytes, write_bytes
+from ...models.storage import read_bytes, temporary_folder, write_bytes
 from ...models.written_files import check_targets, sha256_of
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, problem_in_format
@@ -110,8 +109,8 @@ def verify(
             program_wanted.name: program_wanted.missing for program_wanted in wanted if program_wanted.missing
         },
     )
-    with tempfile.TemporaryDirectory(prefix="crossfield-verify-") as temporary:
-        subjects, broken = _subjects(manifests, Path(temporary))
+    with temporary_folder() as temporary:
+        subjects, broken = _subjects(manifests, temporary)
         verification.checks.extend(broken)
         for program in (program_wanted for program_wanted in wanted if not program_wanted.missing):
             chosen = [subject for subject in subjects if subject.format in program.formats]

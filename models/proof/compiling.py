@@ -11,8 +11,6 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from filelock import FileLock
 
@@ -23,6 +21,7 @@ from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, Over, Progress, never, silent
 from ..search.greedy import greedy_field
 from ..sketch.samples import sample
+from ..storage import temporary_folder
 from .bound import orthogonal_dual
 from .bound.dual import Dual
 from .bound.lattice import Lattice
@@ -58,8 +57,8 @@ def compile_proofs(progress: Progress, stop: Over = never, *, orthogonal: bool) 
     if _is_compiled(orthogonal):
         return True
     progress("compiling the functions of proofs, once on this machine, before the time limit begins")
-    with TemporaryDirectory() as folder, Child() as child:
-        log = Path(folder) / "log"
+    with temporary_folder() as folder, Child() as child:
+        log = folder / "log"
         try:
             return not child.call(compile_all, orthogonal, log=log, stop=stop).interrupted
         except KilledError:

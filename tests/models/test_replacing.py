@@ -4,11 +4,18 @@ import os
 import subprocess
 import sys
 from itertools import count
+from pathlib import Path
 
 import pytest
 from crossfield.models import storage
 from crossfield.models.errors import InputError, OutputError
-from crossfield.models.storage import remove_unfinished, replace_results, replacing, write_bytes
+from crossfield.models.storage import (
+    remove_unfinished,
+    replace_results,
+    replacing,
+    temporary_folder,
+    write_bytes,
+)
 from crossfield.models.written_files import LIST, is_unchanged
 from folders import contents, interrupt_call
 
@@ -234,3 +241,16 @@ def test_temporary_files_of_other_programs_stay(tmp_path):
     storage.remove_dead.cache_clear()
     write_bytes(tmp_path / "a", b"")
     assert contents(tmp_path) == others | {"a": b""}
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
+def test_a_full_disk_of_temporary_files_is_named_with_a_remedy(tmp_path):
+    def write(path):
+        with temporary_folder() as folder:
+            (folder / "full").symlink_to("/dev/full")
+            (path or folder / "full").write_bytes(b"x")
+
+    with pytest.raises(OutputError, match=r"no room for temporary files.* set TMPDIR to another folder"):
+        write(None)
+    with pytest.raises(FileNotFoundError):
+        write(tmp_path / "none" / "file")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
@@ -13,6 +12,7 @@ from ....models.formulations.problem import Problem
 from ....models.instance.file import read_instance
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import read_certificate
+from ....models.storage import temporary_folder
 from ...bundle.starts import Start, complete_start
 from ...formats.registry import Written, write
 from ...solutions.readers.ampl import write_ampl_sol
@@ -33,8 +33,7 @@ _NOT_PROVEN: Final = 100  # AMPL's solve code of a solution that may not be the 
 
 def make_entry(task: EntryTask) -> Files:
     """Make the files of an entry; return their contents by name, the sidecar last."""
-    with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
-        folder = Path(temporary)
+    with temporary_folder() as folder:
         instance, known = _read_known_fields(task, folder)
         recipe, jumps = task.recipe, known["baseline"].field.p
         problem = formulate_entry(instance, recipe.formulation, recipe.facet, jumps)

@@ -5,11 +5,9 @@ The work is limited in rounds, nodes and labels, never in time, so every build f
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from importlib.metadata import version
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -25,6 +23,7 @@ from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.reproducible_angles import reproducible_field
 from ....models.search.search import search
+from ....models.storage import temporary_folder
 from ..ledger.known_points import InstancePoints
 from ..ledger.points import (
     METHOD,
@@ -144,8 +143,8 @@ def _prove(start: CrossField, file: str, norm: Norm = 2) -> tuple[KnownField, Ch
     field = reproducible_field(proof.field) if norm == 2 else proof.field
     if isinstance(proof, Proof):  # the bytes of other proofs hold their field
         proof = replace(proof, field=field, energy=field.energy(norm).total)
-    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-        path = Path(folder) / "a.certificate.npz"
+    with temporary_folder() as folder:
+        path = folder / "a.certificate.npz"
         claim = write_certificate(proof, path)
         data = path.read_bytes()
     known = KnownField(field, provenance_by(METHOD))

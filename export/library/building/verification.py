@@ -7,7 +7,6 @@ which replace every search. Points are also checked by the exact program that ev
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
@@ -18,7 +17,7 @@ from ....models.errors import CrossfieldError, InputError
 from ....models.input_limits import MAX_SOLUTION
 from ....models.packed import unpack
 from ....models.processes.deadline import Progress, silent
-from ....models.storage import read_bytes
+from ....models.storage import read_bytes, temporary_folder
 from ....models.written_files import LIST
 from ...formats.registry import program_version
 from ..documents.check_point import BadInputError, check
@@ -127,8 +126,7 @@ def _find_differences(
             reason = f"was made by {stated}, so {program_version()} cannot make it again to compare it"
             yield Defect(INDEX, reason, f"verify with {stated}")
             return
-        with tempfile.TemporaryDirectory(prefix="crossfield-") as temporary:
-            again = Path(temporary)
+        with temporary_folder() as again:
             ledger, points = read_ledger(folder), all_points_of(library)
             rebuilt = build_locked(library.spec, again, ledger, points, jobs=jobs, progress=progress)
             yield from (Defect.of(error, name) for name, error in rebuilt.failed.items())

@@ -6,7 +6,6 @@ start. Runs that the ledger has are not repeated.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -23,6 +22,7 @@ from ....models.field.field import CrossField
 from ....models.formulations.problem import Problem
 from ....models.processes.deadline import Progress, silent
 from ....models.processes.limits import Limits
+from ....models.storage import temporary_folder
 from ...solutions.solution import Solution, read_solution
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, choose_format
@@ -163,9 +163,9 @@ class _SolveSession:
         if SOLVERS[solver].is_bundled:
             known = read_solution(self.library.folder / document["best"]["point"], problem)
             start = None if known.point is None else clipped_field(known.problem, known.point)
-        with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
+        with temporary_folder() as folder:
             solution = self.solvers.solve(problem, solver, folder=folder, limits=limits, start=start)
-            if not solution.interrupted and not list(Path(folder).glob("*.log")):
+            if not solution.interrupted and not list(folder.glob("*.log")):
                 raise SolverError(f"the time limit of {self.limit:g} s left no time to start {solver}")
         return solution
 

@@ -6,10 +6,8 @@ solver tolerances.
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -20,6 +18,7 @@ from ....models.instance.angles import QUARTER
 from ....models.instance.domain import Floats
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import Certificate, read_certificate
+from ....models.storage import temporary_folder
 from ...formats.registry import program_version
 from .grades import FEASIBLE
 
@@ -82,8 +81,8 @@ def certificate_file(instance: str, norm: Norm) -> str:
 
 def check_certificate(data: bytes, file: str, on: Instance, provenance: Provenance) -> CheckedCertificate:
     """Check the bytes of a certificate of an instance. Raises as `read_certificate`."""
-    with tempfile.TemporaryDirectory(prefix="crossfield-") as folder:
-        path = Path(folder) / file
+    with temporary_folder() as folder:
+        path = folder / file
         path.write_bytes(data)
         return CheckedCertificate.of(read_certificate(path, on=on), file, data, provenance)
 
