@@ -11,7 +11,7 @@ from scipy.linalg import solveh_banded
 from scipy.sparse.linalg import LinearOperator, cg, splu
 
 from ..processes.blas_threads import one_thread
-from .domain import Floats, Ints
+from .domain import Bools, Floats, Ints
 
 Solve = Callable[[np.ndarray[Any, Any]], np.ndarray[Any, Any]]
 
@@ -21,7 +21,7 @@ _SINGULAR: Final = 1e-13  # share of a diagonal that is added where rounding has
 _ROUNDING: Final = 1e-9  # residual, absolute, below which a local solution would follow rounding
 _DENSE: Final = 8  # columns of a dense block in the factors by nested dissection
 _LEAF: Final = 24  # places that are not parted
-_MOST_LOCAL_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
+_MOST_STEPS: Final = 1000  # of conjugate gradients without a factorisation; 20 to 100 are usual
 
 
 def factor_matrix(matrix: Any, order: Ints | None = None, *, pull: float = PULL) -> Solve:
@@ -82,11 +82,68 @@ def nested_dissection_order(row: Ints, column: Ints, reach: int) -> Ints:
     return np.concatenate(order[::-1])
 
 
-def solve_banded(matrix: Any, right: Floats) -> Floats:
-    """The x with (H + PULL) x = right, H real and semidefinite, for few unknowns that meet only near ones.
+def solve_by_gradients(
+    matrix: Any,
+    right: np.ndarray[Any, Any],
+    residual: float,
+    *,
+    steps: int = _MOST_STEPS,
+    inverse: Solve | None = None,
+) -> tuple[np.ndarray[Any, Any], bool]:
+    """Solve (H + PULL) x = right by conjugate gradients, H Hermitian and semidefinite.
 
-    Cholesky's factors are computed within a band: quicker than sparse ones below some thousand unknowns.
+    residual: relative, at which to end. inverse: preconditioner; None divides by the diagonal, and ends at a
+    residual of 1e-9, too. Returns x, and whether that many steps were too few.
     """
+    least = _ROUNDING if inverse is None else 0.0
+    if inverse is None:
+        scale = 1 / (matrix.diagonal().real + PULL)
+        inverse = scale.__mul__
+    pulled = LinearOperator(matrix.shape, lambda v: matrix @ v + PULL * v, dtype=matrix.dtype)
+    near = LinearOperator(matrix.shape, inverse, dtype=matrix.dtype)
+    with one_thread():
+        x, late = cg(pulled, right, rtol=residual, atol=least, maxiter=steps, M=near)
+    return x, late != 0
+
+
+class SimilarSystems:
+    """Solves similar symmetric systems one after another, by the factors of an earlier one if few steps do.
+
+    Parameters
+    ----------
+    order
+        Of elimination, as of `factor_matrix`.
+    steps
+        Of conjugate gradients, preconditioned by these factors, after which the present system is factored.
+    few
+        Unknowns of systems on a grid that are always solved exactly, within a band.
+
+    """
+
+    def __init__(self, order: Ints | None = None, *, steps: int = 25, few: int = 0) -> None:
+        self._order, self._steps, self._few = order, steps, few
+        self._factors: Solve | None = None
+
+    def solve(self, matrix: Any, right: Floats, residual: float, free: Bools | None = None) -> Floats:
+        """The x with (H + PULL) x = right on the free unknowns, 0 on others, to a relative residual."""
+        if len(right) <= self._few:
+            return _solve_banded(matrix, right)
+        if free is not None and not free.all():
+            only = sparse.diags_array(free.astype(np.float64))
+            right, matrix = only @ right, only @ matrix @ only + sparse.diags_array(1.0 - free)
+        for _ in range(2):
+            if self._factors is not None:
+                x, late = solve_by_gradients(
+                    matrix, right, residual, steps=self._steps, inverse=self._factors
+                )
+                if not late:
+                    break
+            self._factors = factor_matrix(matrix, self._order)
+        return x
+
+
+def _solve_banded(matrix: Any, right: Floats) -> Floats:
+    """The x with (H + PULL) x = right by Cholesky factors within a band: quick for few unknowns."""
     entries = matrix.tocoo()
     row, column = entries.coords
     below = row >= column
@@ -97,51 +154,3 @@ def solve_banded(matrix: Any, right: Floats) -> Floats:
     with one_thread():
         solution: Floats = solveh_banded(band, right, lower=True, check_finite=False)
     return solution
-
-
-def solve_locally(matrix: Any, right: np.ndarray[Any, Any], tolerance: float) -> np.ndarray[Any, Any]:
-    """The x with Ax = right to a relative residual, A Hermitian, by diagonally scaled conjugate gradients."""
-    inverse = 1 / (matrix.diagonal().real + PULL)
-    scaled = LinearOperator(matrix.shape, matvec=lambda v: inverse * v, dtype=matrix.dtype)
-    with one_thread():
-        solution: np.ndarray[Any, Any] = cg(
-            matrix, right, rtol=tolerance, atol=_ROUNDING, maxiter=_MOST_LOCAL_STEPS, M=scaled
-        )[0]
-    return solution
-
-
-class SimilarSystems:
-    """Solves similar symmetric systems one after another, by the factors of an earlier one if few steps do.
-
-    Parameters
-    ----------
-    order
-        Of elimination, as of `factor_matrix`.
-    residual
-        Relative residual of solutions by the factors of an earlier system; others are exact.
-    steps
-        Of conjugate gradients, preconditioned by these factors, after which the present system is factored.
-    few
-        Unknowns of systems that are always solved exactly.
-
-    """
-
-    def __init__(self, order: Ints, *, residual: float, steps: int, few: int) -> None:
-        self._order, self._residual, self._steps, self._few = order, residual, steps, few
-        self._factors: Solve | None = None
-
-    def solve(self, matrix: Any, right: Floats) -> Floats:
-        """The solution of a positive semidefinite system."""
-        if len(right) <= self._few:
-            return solve_banded(matrix, right)
-        if self._factors is not None:
-            inverse = LinearOperator(matrix.shape, self._factors, dtype=right.dtype)
-            with one_thread():
-                solution, late = cg(
-                    matrix, right, rtol=self._residual, atol=_ROUNDING, maxiter=self._steps, M=inverse
-                )
-            if not late:
-                found: Floats = solution
-                return found
-        self._factors = factor_matrix(matrix, self._order)
-        return self._factors(right)

@@ -18,10 +18,11 @@ from ..instance.angles import QUARTER
 from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
 from ..instance.least_squares import Residuals, residuals_at
-from ..instance.sparse_systems import PULL
+from ..instance.sparse_systems import PULL, SimilarSystems
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
-from .energy import LinearSolver
+
+CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
 
 _SLOPE: Final = 1e-12  # relative to the largest entry of b; rounding leaves about 1e-15
 _NEAR: Final = 1e-3  # radians from a bound within which it may hold a variable
@@ -70,7 +71,7 @@ def minimise_in_box(
     lower: Floats,
     upper: Floats,
     *,
-    solver: LinearSolver | None = None,
+    solver: SimilarSystems | None = None,
     tolerance: float = _SLOPE,
     over: Over = never,
 ) -> Floats:
@@ -80,7 +81,7 @@ def minimise_in_box(
     tolerance: the largest remaining slope that no bound balances, relative to 1 + the largest entry of b.
     solver: one that was used for a similar system, which saves a factorisation.
     """
-    solver = LinearSolver() if solver is None else solver
+    solver = SimilarSystems() if solver is None else solver
     enough = tolerance * (1 + np.abs(energy.right_side).max())
     stiffness = energy.normal_matrix.diagonal() + PULL
     x = np.clip(x, lower, upper)
@@ -93,7 +94,7 @@ def minimise_in_box(
             break
         near = min(_NEAR, np.abs(plain).max())
         held = np.where(slope > 0, x <= lower + near, x >= upper - near)
-        step = np.where(held, plain, solver.step(energy.normal_matrix, -slope, _NEWTON, ~held))
+        step = np.where(held, plain, solver.solve(energy.normal_matrix, -slope, _NEWTON, ~held))
         ends = (np.clip(x + 0.5**k * step, lower, upper) for k in range(_MOST_HALVINGS))
         end = next((end for end in ends if _falls_enough(energy, slope, end - x)), None)
         if end is None:

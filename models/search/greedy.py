@@ -17,12 +17,11 @@ from ..field.jumps import free_jumps
 from ..instance.domain import Bools, Ints
 from ..instance.instance import Instance
 from ..instance.least_squares import residuals_at
-from ..instance.sparse_systems import solve_locally
+from ..instance.sparse_systems import SimilarSystems, solve_by_gradients
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
-from .box_qp import FreeField
-from .energy import CLOSE, LinearSolver
+from .box_qp import CLOSE, FreeField
 from .integer_fields import greedy_integer_field
 from .nearest_stroke import nearest_strokes
 
@@ -96,7 +95,7 @@ def _grow_cells(instance: Instance) -> tuple[FreeField, Ints]:
 
 def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: Progress = silent) -> None:
     """Decide the jumps between cells, cheapest first, in batches."""
-    grid, solver = state.instance.grid, LinearSolver()
+    grid, solver = state.instance.grid, SimilarSystems()
     known = nearest[grid.first] == nearest[grid.second]
     _update_angles(state, known, solver, pace.local)
     added = 0.0
@@ -116,11 +115,11 @@ def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: 
         progress(f"{int(known.sum())} of {len(known)} jumps")
 
 
-def _update_angles(state: FreeField, known: Bools, solver: LinearSolver, local: float | None) -> None:
+def _update_angles(state: FreeField, known: Bools, solver: SimilarSystems, local: float | None) -> None:
     """Update angles, accurately enough to rank the unknown jumps."""
     energy = residuals_at(state.instance, state.p, known)
     right = -energy.slope(state.x)
     if local is None:
-        state.x = state.x + solver.step(energy.normal_matrix, right, CLOSE)
+        state.x = state.x + solver.solve(energy.normal_matrix, right, CLOSE)
     else:
-        state.x = state.x + solve_locally(energy.normal_matrix, right, local)
+        state.x = state.x + solve_by_gradients(energy.normal_matrix, right, local)[0]

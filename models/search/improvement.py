@@ -19,12 +19,12 @@ from ..instance.angles import HALF, QUARTER, line_difference
 from ..instance.domain import Ints
 from ..instance.instance import Instance
 from ..instance.least_squares import residuals_at
+from ..instance.sparse_systems import SimilarSystems
 from ..instance.terms import parity_sign
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Stop, never, stop_function
-from .box_qp import FreeField, minimise_in_box, stroke_bounds
-from .energy import CLOSE, LinearSolver
+from .box_qp import CLOSE, FreeField, minimise_in_box, stroke_bounds
 from .nearest_stroke import chamfer_distances, nearest_strokes
 
 FALL: Final = 1e-9  # least fall of the energy, relative to 1 + energy: less may be rounding
@@ -56,7 +56,7 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
         A field whose 2-norm energy (docs/mathematics.md, 5) does not exceed the energy of `field`.
 
     """
-    state, solver, over = FreeField.of(field), LinearSolver(), stop_function(stop)
+    state, solver, over = FreeField.of(field), SimilarSystems(), stop_function(stop)
     settle(state, solver, over)
     if field.instance.gauge == "strokes" and not takes_integers(field.instance):
         _exchange_families(state, solver, over)
@@ -64,7 +64,7 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
     return improved if improved.energy().total < field.energy().total else field
 
 
-def settle(state: FreeField, solver: LinearSolver, over: Over = never, *, enough: float = FALL) -> None:
+def settle(state: FreeField, solver: SimilarSystems, over: Over = never, *, enough: float = FALL) -> None:
     """Alternate solving within the bounds and choosing jumps, until a round's relative fall is below enough.
 
     Singularities move by a pixel per round, on fine grids for a hundred rounds.
@@ -100,7 +100,7 @@ def _swap_lines(state: FreeField) -> None:
     state.alpha, state.beta = alpha, beta
 
 
-def _exchange_families(state: FreeField, solver: LinearSolver, over: Over) -> None:
+def _exchange_families(state: FreeField, solver: SimilarSystems, over: Over) -> None:
     """Let curves change their family of lines where that lowers the energy, the worst first."""
     instance, grid = state.instance, state.instance.grid
     curve = stroke_curves(instance)
@@ -115,7 +115,7 @@ def _exchange_families(state: FreeField, solver: LinearSolver, over: Over) -> No
             _turn_if_better(state, quarters, solver, over)
 
 
-def _turn_if_better(state: FreeField, curve_quarters: Ints, solver: LinearSolver, over: Over) -> None:
+def _turn_if_better(state: FreeField, curve_quarters: Ints, solver: SimilarSystems, over: Over) -> None:
     """Turn the crosses round a curve (own = 1) by a quarter either way, and keep the largest decrease."""
     enough = state.energy * (1 - 1e-6) - 1e-9
     trials = [_turn_trial(state, quarters, solver) for quarters in (curve_quarters, -curve_quarters)]
@@ -126,7 +126,7 @@ def _turn_if_better(state: FreeField, curve_quarters: Ints, solver: LinearSolver
             state.x, state.p = best.x, best.p
 
 
-def _turn_trial(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeField:
+def _turn_trial(state: FreeField, quarters: Ints, solver: SimilarSystems) -> FreeField:
     """The state after turning labels back by `quarters`, solved: strokes pull at the other line."""
     grid, sign = state.instance.grid, parity_sign(quarters)
     trial = FreeField(state.instance, *step_labels(grid, state.alpha, state.beta, state.p, -quarters))
@@ -135,7 +135,7 @@ def _turn_trial(state: FreeField, quarters: Ints, solver: LinearSolver) -> FreeF
     # close.
     old = np.concatenate([np.ones(grid.size), sign])
     matrix = sparse.diags_array(old) @ energy.normal_matrix @ sparse.diags_array(old)
-    trial.x = trial.x + old * solver.step(matrix, -old * energy.slope(trial.x), CLOSE)
+    trial.x = trial.x + old * solver.solve(matrix, -old * energy.slope(trial.x), CLOSE)
     return trial
 
 

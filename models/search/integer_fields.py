@@ -9,12 +9,12 @@ from __future__ import annotations
 from ..field.field import CrossField
 from ..instance.domain import Ints
 from ..instance.instance import Instance
+from ..instance.sparse_systems import SimilarSystems
 from ..orthogonal.energy import MOST_DENSE, OrthogonalEnergy, field_of, integers_of
 from ..orthogonal.greedy import round_greedily
 from ..processes.deadline import Over
 from ..smooth.polyvector import power_field
 from .box_qp import FreeField, fit_in_box
-from .energy import LinearSolver
 from .improvement import settle
 
 
@@ -57,5 +57,5 @@ def finish_field(instance: Instance, energy: OrthogonalEnergy, z: Ints, over: Ov
     if have_energies_of_fields(instance):
         return fit_in_box(field, over)
     state = FreeField.of(field)
-    settle(state, LinearSolver(), over)
+    settle(state, SimilarSystems(), over)
     return state.fit_in_bounds(over)

@@ -17,10 +17,10 @@ from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.grid import Grid
 from ..instance.least_squares import Residuals, residuals_at
+from ..instance.sparse_systems import SimilarSystems
 from ..orthogonal.energy import OrthogonalEnergy
 from ..processes.blas_threads import one_thread
 from .box_qp import angle_bounds, field_at, fit_in_box
-from .energy import LinearSolver
 from .nearest_stroke import nearest_strokes
 
 _DECIMALS: Final = 12  # as in directions of strokes
@@ -51,7 +51,7 @@ def reproducible_field(field: CrossField) -> CrossField:
     """
     instance, start = field.instance, fit_in_box(field)
     lower, upper = angle_bounds(instance)
-    energy, solver = residuals_at(instance, field.p), LinearSolver()
+    energy, solver = residuals_at(instance, field.p), SimilarSystems()
     unreached = np.zeros(len(lower), dtype=bool)
     if isinstance(instance.domain, Grid):
         unreached = np.tile(nearest_strokes(instance) < 0, 2)
@@ -61,7 +61,7 @@ def reproducible_field(field: CrossField) -> CrossField:
     for _ in range(_MOST_STEPS):
         slope = _slope(energy, x, rest)
         held = unreached | ((x <= lower) & (slope > 0)) | ((x >= upper) & (slope < 0))
-        step = solver.step(energy.normal_matrix, -slope, _LINEAR, ~held)
+        step = solver.solve(energy.normal_matrix, -slope, _LINEAR, ~held)
         moved = np.clip(x + (rest + step), lower, upper)
         inside = (moved > lower) & (moved < upper)
         x, rest = moved, np.where(inside, (rest + step) - (moved - x), 0.0)

@@ -18,6 +18,7 @@ from ..arguments import check_count
 from ..field.field import CrossField
 from ..instance.domain import Bools
 from ..instance.instance import Instance
+from ..instance.sparse_systems import SimilarSystems
 from ..orthogonal.energy import OrthogonalEnergy, lowered, takes_integers
 from ..orthogonal.search import IntegerSearch
 from ..processes.blas_threads import one_thread
@@ -28,7 +29,6 @@ from ..processes.process_groups import catch_interrupts
 from ..processes.process_pool import parallel_map
 from ..smooth.polyvector import power_field
 from .box_qp import FreeField, stroke_bounds
-from .energy import LinearSolver
 from .improvement import pixel_curves, settle
 from .integer_fields import finish_field, have_energies_of_fields, starting_integers
 from .landscape import FieldPoint
@@ -232,7 +232,7 @@ class _Hunt:
         self._start = start
         self._state = FreeField.of(start)
         self._bounds = stroke_bounds(instance)
-        self._solver = LinearSolver()
+        self._solver = SimilarSystems()
         self._unsettled = False
         self._curve = pixel_curves(instance)
 

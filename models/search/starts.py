@@ -19,14 +19,13 @@ from ..field.fusion import fuse_fields
 from ..field.jumps import free_jumps
 from ..instance.instance import Instance
 from ..instance.least_squares import residuals_at
-from ..instance.sparse_systems import solve_locally
+from ..instance.sparse_systems import SimilarSystems, solve_by_gradients
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, never
 from ..smooth.polyvector import HOLDS, polyvector_field
 from .box_qp import FreeField, fit_in_box, stroke_bounds
 from .coarse_grid import copy_to_fine_grid, halve_resolution
-from .energy import LinearSolver
 from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle
 from .integer_fields import first_integer_field
@@ -138,9 +137,8 @@ def _settle_roughly(state: FreeField) -> None:
     bounds = stroke_bounds(state.instance)
     for _ in range(_HASTE):
         energy = residuals_at(state.instance, state.p)
-        state.x = np.clip(
-            state.x + solve_locally(energy.normal_matrix, -energy.slope(state.x), _HASTY), *bounds
-        )
+        step, _ = solve_by_gradients(energy.normal_matrix, -energy.slope(state.x), _HASTY)
+        state.x = np.clip(state.x + step, *bounds)
         state.p = free_jumps(state.instance, state.alpha, state.beta)[0]
 
 
@@ -152,7 +150,7 @@ def _fuse_states(states: list[FreeField], over: Over) -> FreeField:
             break
         best = fuse_fields(best, candidate.field)
     state = FreeField.of(best)
-    settle(state, LinearSolver(), over, enough=_CREEP)
+    settle(state, SimilarSystems(), over, enough=_CREEP)
     return min(state, states[0], key=_state_energy)
 
 

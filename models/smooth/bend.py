@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import LinearOperator, cg
+from scipy.sparse.linalg import LinearOperator
 
 from ..arguments import check_positive
 from ..field.field import CrossField
@@ -22,6 +22,7 @@ from ..instance.angles import HALF, QUARTER, wrap
 from ..instance.domain import Floats, Ints
 from ..instance.grid import Grid
 from ..instance.least_squares import Residuals, two_entry_matrix
+from ..instance.sparse_systems import Solve, solve_by_gradients
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Over, Stop, stop_function
 from .two_levels import approximate_inverse
@@ -148,7 +149,7 @@ class _Bend:
         linear = Residuals.join([even, _stroke_residuals(start, hold), skew])
         return cls(start.instance.grid, links, differences, *_quadrants(start), linear)
 
-    def least(self, x: Floats, inverse: LinearOperator, over: Over, fall: float) -> Floats:
+    def least(self, x: Floats, inverse: Solve, over: Over, fall: float) -> Floats:
         """Angles of low energy, in rounds that begin at x and end with one that removes less than `fall`."""
         energy, slope, along = self.at(x)
         for number in range(_ROUNDS):
@@ -170,13 +171,13 @@ class _Bend:
         slope = self.differences.matrix.T @ (along.T @ bend) + self.linear.slope(x)
         return float(np.sum(bend**2)) + self.linear.energy(x), slope, along
 
-    def invert(self, x: Floats) -> LinearOperator:
+    def invert(self, x: Floats) -> Solve:
         """The approximate inverse of the system for the unit vectors at x."""
         bend = self._along(x) @ self.differences.matrix
         matrix = bend.T @ bend + self.linear.normal_matrix
-        return LinearOperator(matrix.shape, approximate_inverse(matrix, self.grid, *self.links), dtype=float)
+        return approximate_inverse(matrix, self.grid, *self.links)
 
-    def _step(self, along: Any, slope: Floats, inverse: LinearOperator, residual: float) -> Floats:
+    def _step(self, along: Any, slope: Floats, inverse: Solve, residual: float) -> Floats:
         """Minus the step to about the least energy for fixed unit vectors, by conjugate gradients."""
 
         def product(v: Floats) -> Floats:
@@ -184,9 +185,8 @@ class _Bend:
             total: Floats = matrix.T @ (along.T @ (along @ (matrix @ v))) + self.linear.normal_matrix @ v
             return total
 
-        times = LinearOperator(inverse.shape, product, dtype=np.float64)
-        step: Floats = cg(times, slope, rtol=residual, maxiter=_STEPS, M=inverse)[0]
-        return step
+        system = LinearOperator((len(slope), len(slope)), product, dtype=np.float64)
+        return solve_by_gradients(system, slope, residual, steps=_STEPS, inverse=inverse)[0]
 
     def _along(self, x: Floats) -> Any:
         """The matrix (q, 2m) from differences to derivatives along the other line; a quadrant counts 1/4."""

@@ -13,17 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
-from scipy.sparse.linalg import LinearOperator, cg
 
 from ..arguments import check_positive
 from ..field.field import CrossField, field_in_windows
 from ..field.jumps import free_jumps, label_of
 from ..instance.angles import HALF
 from ..instance.domain import Floats
-from ..instance.grid import Grid
 from ..instance.instance import Instance
 from ..instance.least_squares import Residuals, two_entry_matrix
-from ..instance.sparse_systems import Solve, factor_matrix, solve_locally
+from ..instance.sparse_systems import Solve, factor_matrix, solve_by_gradients
 from ..processes.blas_threads import one_thread
 from .two_levels import FEW, approximate_inverse
 
@@ -98,12 +96,15 @@ def _polynomials(instance: Instance, hold: float, tolerance: float | None) -> tu
     once = sums(weight * root) * (not instance.orthogonal)
     matrix = _couple_coefficients(alike, once, instance.skew_coefficient)
     right = np.concatenate([-sums(weight * root**2), -once])
+    x, is_late = np.zeros_like(right), True
     if tolerance is not None:
-        x = solve_locally(matrix, right, tolerance)
-    elif size <= FEW:
+        x, is_late = solve_by_gradients(matrix, right, tolerance)[0], False
+    elif size > FEW:
+        links = (np.concatenate([ends, ends + size]) for ends in (instance.grid.first, instance.grid.second))
+        inverse = approximate_inverse(matrix, instance.grid, *links)
+        x, is_late = solve_by_gradients(matrix, right, _EXACT, steps=_STEPS, inverse=inverse)
+    if is_late:
         x = factor_matrix(matrix)(right)
-    else:
-        x = _solve_large(matrix, right, instance.grid)
     return x[:size], x[size:]
 
 
@@ -117,14 +118,6 @@ def _smoothness(instance: Instance, power: int = 0) -> Any:
     turn = 1.0 if pairs.kappa is None or power == 0 else np.exp(1j * power * pairs.kappa)
     rows = two_entry_matrix(pairs.first, pairs.second, n, turn)
     return Residuals(rows, np.zeros(m), pairs.weighted(np.full(m, 2.0))).normal_matrix
-
-
-def _solve_large(matrix: Any, right: _Complex, grid: Grid) -> _Complex:
-    """The solution up to rounding, without factors of the matrix unless conjugate gradients are late."""
-    links = (np.concatenate([ends, ends + grid.size]) for ends in (grid.first, grid.second))
-    inverse = LinearOperator(matrix.shape, approximate_inverse(matrix, grid, *links), dtype=matrix.dtype)
-    x, late = cg(matrix, right, rtol=_EXACT, maxiter=_STEPS, M=inverse)
-    return np.asarray(factor_matrix(matrix)(right) if late else x)
 
 
 def _couple_coefficients(alike: Any, cross: _Complex, skew: float) -> Any:

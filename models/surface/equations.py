@@ -227,7 +227,7 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
 def descend(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
     """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
     energy, damping = equations.energy(z), _DAMPING
-    solver = SimilarSystems(equations.stencils.order, residual=_RESIDUAL, steps=_STEPS, few=_FEW)
+    solver = SimilarSystems(equations.stencils.order, steps=_STEPS, few=_FEW)
     for _ in range(_ROUNDS):
         if over():
             break
@@ -235,7 +235,7 @@ def descend(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]
         diagonal = sparse.diags_array(curvature.diagonal())
         for _ in range(_TRIALS):
             damped = curvature + damping * diagonal
-            tried = z - solver.solve(damped, slope)
+            tried = z - solver.solve(damped, slope, _RESIDUAL)
             reached = equations.energy(tried)
             if reached < energy:
                 break

@@ -15,7 +15,7 @@ import hashlib, json, time
 import crossfield as cf
 from crossfield.models.search.angle_program import fit_absolute
 from crossfield.models.search.box_qp import FreeField, fit_in_box
-from crossfield.models.search.energy import LinearSolver
+from crossfield.models.instance.sparse_systems import SimilarSystems
 from crossfield.models.search.improvement import settle
 from crossfield.models.search.starts import first_field
 
@@ -25,7 +25,7 @@ power = cf.power_field(instance)
 
 def settled():
     state = FreeField.of(power)
-    settle(state, LinearSolver())
+    settle(state, SimilarSystems())
     return state.fit_in_bounds()
 
 methods = {

@@ -15,10 +15,10 @@ from ...field.field import CrossField, field_in_windows
 from ...field.jumps import free_jumps
 from ...instance.angles import QUARTER
 from ...instance.domain import Bools, Floats
+from ...instance.sparse_systems import SimilarSystems
 from ...processes.compilation import compiled, inlined
 from ...processes.deadline import Over, never
 from ...search.box_qp import FreeField
-from ...search.energy import LinearSolver
 from ...search.improvement import improved_field, settle
 from .dual import Dual
 from .passes import add_to, least_a, shares_at, size_of
@@ -62,7 +62,7 @@ class Rounding:
 def better_field(rounded: CrossField, best: CrossField, over: Over) -> CrossField:
     """The field of lower 2-norm energy: the best field, or the new one, improved where that may pay."""
     state = FreeField.of(rounded)
-    settle(state, LinearSolver(), over)
+    settle(state, SimilarSystems(), over)
     if state.energy >= best.energy().total * (1 - _BETTER):
         return best
     return min(
