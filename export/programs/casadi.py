@@ -24,10 +24,7 @@ from ...models.processes.child_program import is_stopped, on_stop
 from ..solutions.readers.ampl import write_ampl_sol
 from ..statuses import CASADI
 from .model_content import Behaviour, Points
-from .protocol import Job, Outcome, RefusedError, file_names, interrupt_self
-
-FEASIBLE: Final = 1e-6
-"""Violation up to which a point counts as feasible: the solvers' own tolerance."""
+from .protocol import FEASIBLE, Job, Outcome, RefusedError, file_names, interrupt_self
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,8 @@
 """The content of a model file as its program reads it, as plain arrays.
 
-export/verify/comparison.py states how it differs from the problem. There are two forms. A `Algebra` is the
-algebra: costs, quadratic terms and rows by coefficient, as readers of LP and MPS report it. An `Behaviour`
-is the behaviour: values of objective and rows at points, as readers of .nl and GAMS report it.
+export/verify/comparison.py states how it differs from the problem. There are two forms: an `Algebra` holds
+the coefficients of costs, products and rows, as readers of LP and MPS report them, and a `Behaviour` the
+values of objective and rows at points, as readers of .nl and GAMS report them.
 """
 
 from __future__ import annotations

@@ -3,9 +3,9 @@
 The table of solvers lists the programs. Each has a module here, which is imported in a child process only:
 
     version() -> str                  version of the program
-    read(path) -> Meaning             the algebra of an LP or MPS file, where the program reports it
-    evaluate(path, points) -> Evaluation    the behaviour of a file of another format
-    solve(job) -> Outcome             solve a model file and write a solution file, where it solves
+    read(path) -> Algebra                   the coefficients of an LP or MPS file, where it reports them
+    evaluate(path, points) -> Behaviour     the values of a file of another format at points
+    solve(job) -> Outcome                   solve a model file and write a solution file, where it solves
 
 A module raises RefusedError, NotReportedError or TooLargeError. Files are not compressed; the current folder
 is the child's own.
@@ -28,6 +28,8 @@ from ...models.processes.child_program import is_stopped, on_stop
 from ...models.processes.deadline import Deadline
 from ..statuses import Status
 
+FEASIBLE: Final = 1e-6
+"""Violation up to which a point counts as feasible: the solvers' own tolerance."""
 _WRITING: Final = 0.2
 _LEAST: Final = 0.01
 

@@ -41,6 +41,7 @@ from ..bundle.manifest import add_to_manifest, file_stem, instance_file
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, file_names, problem_in_format, write
 from ..programs.protocol import (
+    FEASIBLE,
     FailedError,
     Job,
     Outcome,
@@ -54,8 +55,6 @@ from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Suitability, sui
 from ..statuses import Status
 from ..writing.sink import save_file
 
-FEASIBLE: Final = 1e-6
-"""Violation up to which a start counts as a point of the problem: the solvers' own tolerance."""
 VERSION_SECONDS: Final = 60.0
 """Seconds in which a program has to report its version."""
 _LATE: Final = "returned no answer within its time; give it more, or a start"

@@ -44,18 +44,16 @@ from .leeway import objective_leeway
 
 RESULT: Final = "verify.json"
 SEED: Final = 1
-RANDOM: Final = 4
+RANDOM_POINTS: Final = 4
 """Random points at which files are evaluated."""
-FEASIBLE: Final = 2
+FIELD_POINTS: Final = 2
 """Complete points of random fields at which files are evaluated as well."""
-TOLERANCE: Final = 1e-6
+SAME_OPTIMUM: Final = 1e-6
 """Relative difference up to which optima agree (absolute below 1)."""
 READING_SECONDS: Final = 80.0
 """Seconds for a program to read a file."""
 LATE: Final = 20.0
 """Seconds after its limit at which a solver that ignores the clock is requested to stop."""
-GAP: Final = 0.0
-"""Relative gap of a solve: zero, so that optima can be compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,11 +168,11 @@ def _unpack_file(source: Path, folder: Path) -> Path:
 def _test_points(problem: Problem) -> Points:
     """Arbitrary points, then complete points of random fields, which respect bounds, rows and integrality."""
     rng = np.random.default_rng(SEED)
-    anywhere = rng.normal(size=(RANDOM, problem.n_columns))
-    feasible = [problem.point(random_field(problem, seed)) for seed in range(FEASIBLE)]
+    anywhere = rng.normal(size=(RANDOM_POINTS, problem.n_columns))
+    feasible = [problem.point(random_field(problem, seed)) for seed in range(FIELD_POINTS)]
     values = np.concatenate([anywhere, np.array(feasible)])
     objective = np.array([problem.objective_value(point) for point in values])
-    return Points(name_list(column_names(problem.instance, problem.blocks)), values, objective, RANDOM)
+    return Points(name_list(column_names(problem.instance, problem.blocks)), values, objective, RANDOM_POINTS)
 
 
 def random_field(problem: Problem, seed: int) -> CrossField:
@@ -254,7 +252,7 @@ class _ProgramChecks:
         if missing := SOLVERS[solver].missing:
             return result(Verdict.NOT_TRIED, missing)
         files = SolveFiles.for_model(subject.path, solver)
-        limits = Limits(seconds, GAP, threads=1)
+        limits = Limits(seconds, gap=0.0, threads=1)  # so that optima can be compared
         try:
             solution = self.solvers.solve_file(
                 subject.held, solver, files, limits, Deadline.after(seconds + LATE), precise=True
@@ -323,7 +321,7 @@ def _energy_difference(
 
 def is_same_optimum(first: float, second: float) -> bool:
     """Whether two optima agree."""
-    return abs(first - second) <= TOLERANCE * max(1.0, abs(second))
+    return abs(first - second) <= SAME_OPTIMUM * max(1.0, abs(second))
 
 
 def _is_above(value: float, best: float) -> bool:

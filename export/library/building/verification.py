@@ -24,7 +24,7 @@ from ..documents.check_point import BadInputError, check
 from ..documents.checksums import SUMS, is_intact, read_checksums
 from ..documents.documents import INDEX, Library, existing_folder, read_library
 from ..documents.lock import library_lock
-from ..ledger.grades import FEASIBLE
+from ..ledger.grades import ACCEPTED_VIOLATION
 from ..ledger.known_points import all_points_of
 from ..ledger.ledger import LEDGER, read_ledger
 from .build import build_locked, has_unbuilt_records
@@ -180,7 +180,7 @@ def _check_point(task: tuple[Path, str, list[str]]) -> list[Defect]:
             reason = str(error).replace(f"{folder}{os.sep}", "")
             defects.append(Defect(point, f"the checker refuses it: {reason}"))
             continue
-        if result.worst > FEASIBLE:
+        if result.worst > ACCEPTED_VIOLATION:
             reason = f"is not feasible against {model}: worst violation {float(result.worst):.3g}"
             defects.append(Defect(point, reason))
         if not result.agrees:

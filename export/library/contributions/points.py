@@ -22,7 +22,7 @@ from ...solutions.readers.registry import head_of, recognising_readers
 from ...solutions.solution import read_solution
 from ..documents.documents import Library, about_file, existing_folder, problem_of, read_about
 from ..documents.lock import library_lock
-from ..ledger.grades import FEASIBLE, is_better
+from ..ledger.grades import ACCEPTED_VIOLATION, is_better
 from ..ledger.ledger import Record, read_ledger, write_ledger
 from ..ledger.points import clipped_field, complete_point
 from ..plan.recipe import norm_minimised
@@ -85,9 +85,12 @@ class _Check:
         # Every other column follows from angles and jumps, so a solver's tolerance there does not count.
         violation = problem.violation(complete_point(problem, solution.field))
         worst = max(violation.worst, solution.violation.integrality)
-        if worst > FEASIBLE:
-            reason = f"violates {name} by {worst:.3g}, and {FEASIBLE:g} is allowed; use tighter tolerances"
-            raise SolutionError(reason, file=path)
+        if worst > ACCEPTED_VIOLATION:
+            raise SolutionError(
+                f"violates {name} by {worst:.3g}, and {ACCEPTED_VIOLATION:g} is allowed; "
+                "use tighter tolerances",
+                file=path,
+            )
         return clipped_field(solution.problem, solution.point)
 
     def _add_field(self, field: CrossField, path: Path) -> list[str]:

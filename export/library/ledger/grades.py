@@ -27,7 +27,7 @@ Difficulty = Literal["easy", "hard", "open"]
 
 EASY: Final = 60.0  # seconds
 PROVEN: Final = (1e-6, 1e-9)  # greatest gap of an optimal point: relative part, absolute part
-FEASIBLE: Final = 1e-8  # greatest violation of a point that a library accepts
+ACCEPTED_VIOLATION: Final = 1e-8  # greatest violation of a point that a library accepts
 SAME: Final = 1e-9  # objectives this close, relative to their size or absolute, are the same
 AGREE: Final = 3  # programs of different makers that must agree
 MAKERS: Final = {solver.title: solver.maker for solver in SOLVERS.values()}  # by title

@@ -20,7 +20,7 @@ from ....models.instance.instance import Instance
 from ....models.proof.certificate import Certificate, read_certificate
 from ....models.storage import temporary_folder
 from ...formats.registry import program_version
-from .grades import FEASIBLE
+from .grades import ACCEPTED_VIOLATION
 
 METHOD: Final = "prove"
 _SUFFIXES: Final[dict[Norm, str]] = {2: "", 1: ".l1", "mixed": ".mixed"}
@@ -133,8 +133,8 @@ class BestPoint:
 
     @property
     def is_feasible(self) -> bool:
-        """Whether no violation exceeds FEASIBLE."""
-        return self.problem.violation(self.point).worst <= FEASIBLE
+        """Whether no violation exceeds ACCEPTED_VIOLATION."""
+        return self.problem.violation(self.point).worst <= ACCEPTED_VIOLATION
 
     def facts(self) -> dict[str, Any]:
         """Return objective, worst violation, integrality, energy of the field, and provenance."""
