@@ -150,7 +150,7 @@ def _are_in_range(values: Iterable[Any], rule: dict[str, Any]) -> bool:
         return False
     least, above, most = map(rule.get, _ENDS, (-np.inf, -np.inf, np.inf))
     good = (array >= least) & (array > above) & (array <= most)
-    return bool((good & ((array % 1 == 0) | ("number" in kinds))).all())
+    return bool(good.all() and ("number" in kinds or (array == np.floor(array)).all()))
 
 
 @cache
