@@ -161,57 +161,48 @@ def _head(instance: Instance) -> dict[str, Any]:
 def instance_of_document(document: object) -> Instance:
     """Read an instance from a parsed JSON document. Raises InstanceError with the place in the document."""
     check_version(document, FORMAT, VERSION)
-    assert isinstance(document, dict)
-    on_mesh = "vertices" in document
     checked = check_schema(document, "instance", __package__)
-    more = {name: checked[key] for key, name in _SCALARS.items() if key in checked}
-    if "pair_weights" in checked:
-        more["pair_weights"] = checked["pair_weights"]
     try:
-        if on_mesh:
-            return Instance.on_faces(**{"orthogonal": False} | more | _face_arguments(checked))
-        return Instance.on_pixels(**more | _pixel_arguments(checked))
+        return _make_instance(checked, _arrays_of_document(checked))
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
 
 
-def _pixel_arguments(document: dict[str, Any]) -> dict[str, Any]:
-    """Arguments of `Instance.on_pixels` from the mask and the strokes of a document."""
-    width = len(document["mask"][0])
-    for number, row in enumerate(document["mask"]):
-        if len(row) != width:
-            raise InstanceError(
-                f"mask row {number} has {len(row)} pixels, the first one {width}; make them equal"
-            )
-    letters = "".join(document["mask"]).encode()
-    mask = np.frombuffer(letters, dtype=np.uint8).reshape(-1, width) == ord("#")
-    strokes = document["strokes"]
-    check_counts(len(strokes), int(np.count_nonzero(mask)))
-    return {
-        "mask": mask,
-        "stroke_pixels": np.array([stroke[:2] for stroke in strokes], dtype=np.int32).reshape(-1, 2),
-        "theta": np.array([stroke[2] for stroke in strokes], dtype=float),
-        "w": np.array([stroke[3] for stroke in strokes], dtype=float),
-        "origin": tuple(document.get("origin", (0.0, 0.0))),
-        "pixel_size": document.get("pixel_size", 1.0),
-    }
-
-
-def _face_arguments(document: dict[str, Any]) -> dict[str, Any]:
-    """Arguments of `Instance.on_faces` from the rows of a document or the arrays of an archive."""
-    arguments: dict[str, Any] = {"mesh": Mesh(document["vertices"], document["faces"])}
-    if "strokes" in document:
+def _arrays_of_document(document: dict[str, Any]) -> dict[str, Any]:
+    """The lists of a document as arrays, by the names of an .npz."""
+    lists = ("vertices", "faces", "origin", "pair_weights")
+    arrays: dict[str, Any] = {key: document[key] for key in lists if key in document}
+    if "vertices" in document:
         strokes = np.array(document["strokes"], dtype=np.float64).reshape(-1, 3)
-        return arguments | dict(zip(("stroke_faces", "theta", "w"), strokes.T, strict=True))
-    return arguments | {name: document[name] for name in ("stroke_faces", "theta", "w")}
+        arrays["stroke_faces"] = strokes[:, 0]
+    else:
+        width = len(document["mask"][0])
+        for number, row in enumerate(document["mask"]):
+            if len(row) != width:
+                raise InstanceError(
+                    f"mask row {number} has {len(row)} pixels, the first one {width}; make them equal"
+                )
+        letters = np.frombuffer("".join(document["mask"]).encode(), dtype=np.uint8)
+        strokes = np.array(document["strokes"], dtype=np.float64).reshape(-1, 4)
+        arrays |= {"mask": letters.reshape(-1, width) == ord("#"), "stroke_pixels": strokes[:, :2]}
+    return arrays | {"theta": strokes[:, -2], "w": strokes[:, -1]}
 
 
-def check_counts(strokes: int, pixels: int) -> None:
-    """Raise InstanceError if there are more stroke pixels than pixels."""
+def _make_instance(head: dict[str, Any], arrays: dict[str, Any]) -> Instance:
+    """The instance of the scalars in a head and of arrays. Raises InstanceError."""
+    more = {"name": head["name"]} | {name: head[key] for key, name in _SCALARS.items() if key in head}
+    more |= {key: arrays[key] for key in ("theta", "w", "pair_weights") if key in arrays}
+    if "vertices" in arrays:
+        mesh = Mesh(arrays["vertices"], arrays["faces"])
+        strokes = arrays["stroke_faces"]
+        return Instance.on_faces(mesh=mesh, stroke_faces=strokes, **{"orthogonal": False} | more)
+    strokes, pixels = len(arrays["stroke_pixels"]), int(np.count_nonzero(arrays["mask"]))
     if strokes > pixels:
         raise InstanceError(
             f"lists {strokes} stroke pixels, but its mask has {pixels} pixels; list each once"
         )
+    more |= {key: facts[key] for key, facts in (("pixel_size", head), ("origin", arrays)) if key in facts}
+    return Instance.on_pixels(mask=arrays["mask"], stroke_pixels=arrays["stroke_pixels"], **more)
 
 
 def instance_arrays(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
@@ -240,16 +231,6 @@ def instance_of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:
     head = parse_head(arrays)
     check_version(head, FORMAT, VERSION)
     try:
-        more: dict[str, Any] = {
-            name: head[key] for key, name in _SCALARS.items() if key not in {"view", "orthogonal"}
-        }
-        more |= {"view": head.get("view"), "orthogonal": head.get("orthogonal", False)}
-        more["pair_weights"] = arrays.get("pair_weights")
-        if "vertices" in arrays:
-            return Instance.on_faces(**more, **_face_arguments(arrays))
-        check_counts(len(arrays["theta"]), int(np.count_nonzero(arrays["mask"])))
-        x, y = arrays["origin"].astype(np.float64).tolist()
-        entries: dict[str, Any] = {key: arrays[key] for key in ("mask", "stroke_pixels", "theta", "w")}
-        return Instance.on_pixels(origin=(x, y), pixel_size=head["pixel_size"], **more, **entries)
+        return _make_instance({"name": head["name"]} | head, arrays)
     except (KeyError, TypeError, ValueError, IndexError, OverflowError) as error:
         raise InstanceError(f"has an entry of the wrong kind: {shortened(error)}") from error

@@ -179,7 +179,7 @@ def test_a_key_that_is_there_twice_is_named(instance, tmp_path):
             "stroke_pixels holds something other than whole",
         ),
         ("mask", np.ones(3, dtype=bool), "array 'mask' has shape (3,); expected 2 dimensions"),
-        ("origin", np.array([1.0]), "has an entry of the wrong kind"),
+        ("origin", np.array([1.0]), "origin has shape (1,); give two numbers"),
         ("head", np.zeros(4, np.uint8), "its array 'head' is not JSON text"),
         ("head", np.frombuffer(b"[]", np.uint8), '"format" must be'),
         (
