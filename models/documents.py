@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable
+from datetime import date
 from functools import cache
 from importlib.resources import files
 from itertools import islice
@@ -98,10 +99,13 @@ def schema_error(document: dict[str, Any], schema: str, package: str) -> Any | N
     """The outermost jsonschema.ValidationError of a document, None when it obeys its schema."""
     import jsonschema
 
-    lines = jsonschema.FormatChecker(formats=())
-    lines.checks("line")(lambda text: not isinstance(text, str) or text.isprintable())
+    formats = jsonschema.FormatChecker(formats=())
+    formats.checks("line")(lambda text: not isinstance(text, str) or text.isprintable())
+    formats.checks("day", ValueError)(
+        lambda text: not isinstance(text, str) or bool(date.fromisoformat(text))
+    )
     rules = _schema(schema, package)
-    validator = jsonschema.Draft202012Validator(rules, format_checker=lines)
+    validator = jsonschema.Draft202012Validator(rules, format_checker=formats)
     first = islice(validator.iter_errors(_without_checked_rows(document, rules)), _MOST_ERRORS)
     return min(first, key=lambda e: (len(e.absolute_path), str(e.absolute_path)), default=None)
 

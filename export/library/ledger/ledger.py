@@ -21,7 +21,7 @@ from ....models.field.file import field_of_json, field_to_json
 from ....models.processes.process_groups import catch_interrupts
 from ....models.storage import read_bytes, write_bytes
 from .. import documents
-from ..plan.spec import check_day, describe_schema_error
+from ..plan.spec import describe_schema_error
 
 FORMAT: Final = "crossfield-ledger"
 VERSION: Final = 1
@@ -59,7 +59,6 @@ class Record:
 
     def check(self) -> None:
         """Raise InputError that names the invalid value unless a ledger can hold the record."""
-        check_day(self.date or "", "date")
         for name in ("primal", "bound", "seconds", "time_limit"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):

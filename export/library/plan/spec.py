@@ -9,7 +9,6 @@ from __future__ import annotations
 import tomllib
 from collections.abc import Collection, Sequence
 from dataclasses import asdict, dataclass, replace
-from datetime import date
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, Literal, cast, get_args
@@ -78,20 +77,12 @@ class Release:
 
     @classmethod
     def of(cls, table: dict[str, Any]) -> Release:
-        """Return the release that a table states. Raises InputError for an invalid day."""
-        return cls(table["version"], check_day(table["date"], "release.date"), tuple(table["authors"]))
+        """Return the release that a table states."""
+        return cls(table["version"], table["date"], tuple(table["authors"]))
 
     def document(self) -> dict[str, Any]:
         """Return the release as a table of a specification."""
         return asdict(self) | {"authors": list(self.authors)}
-
-
-def check_day(text: str, place: str) -> str:
-    """Return a day as YYYY-MM-DD, and no text as it is. Raises InputError for an invalid day."""
-    try:
-        return date.fromisoformat(text).isoformat() if text else ""
-    except ValueError as error:
-        raise InputError(f"{place}: {text!r} is no day; write one as 2026-11-22") from error
 
 
 @dataclass(frozen=True)
@@ -397,7 +388,6 @@ def _read_rung(
     known = {"formats": FORMATS, "gauges": GAUGES, "facets": FACETS}
     words = {key: _read_words(table, key, known[key], defaults[key], f"rungs.{name}.") for key in known}
     compress, prove = table.get("compress", False), table.get("prove", name in PROVEN)
-    added = check_day(table.get("added", ""), f"rungs.{name}.added")
     tightened = _read_formulations(table, "tightened", (), f"rungs.{name}.")
     for formulation in tightened:
         if formulation not in formulations:
@@ -415,7 +405,7 @@ def _read_rung(
         _whole_numbers(table.get("sizes", [])),
         compress=compress,
         prove=prove,
-        added=added,
+        added=table.get("added", ""),
         tightened=tightened,
         formulations=own,
         **words,
@@ -459,7 +449,7 @@ def _read_sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[R
         rungs=wanted,
         sizes=tuple((rung, _whole_numbers(sizes[rung])) for rung in wanted if rung in sizes),
         origin=Origin.of(table),
-        added=check_day(table.get("added", ""), f"{place}added"),
+        added=table.get("added", ""),
         points=table.get("points", "search"),
         **drawn,
     )

@@ -141,7 +141,10 @@ def test_another_origin_makes_an_instance_again(mixed, tmp_path):
 def test_an_invalid_origin_or_release_is_refused(tmp_path):
     for text, words in (
         (OURS.replace('"2026-02-03"', "2026-02-03"), r"sketches\[0\]\.added: .* write a day in quotes"),
-        (OURS.replace("02-03", "02-30"), r"sketches\[0\]\.added: '2026-02-30' is no day"),
+        (
+            OURS.replace("02-03", "02-30"),
+            r"sketches\[0\]\.added: '2026-02-30' is not a 'day'; write a day in quotes",
+        ),
         (OURS.replace('"CC-BY-4.0"', "4"), r"license: 4 is not of type 'string'; write one line of text"),
         (OURS + '[release]\nversion = "1"\n', "release: 'date' is a required property; write a table"),
     ):
