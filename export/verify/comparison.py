@@ -8,7 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.formulations.arrays import row_terms
-from ...models.formulations.names import column_names, row_names
+from ...models.formulations.names import column_names, decode_names, row_names
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Bools, Floats
 from ..programs.model_content import Algebra, Behaviour, Points, positions_of
@@ -19,25 +19,22 @@ VALUES: Final = 1e-9
 """Relative difference up to which values at a point agree: sums may have another order."""
 
 
-def name_list(matrix: np.ndarray[Any, Any]) -> list[str]:
-    """Names as text, from rows of bytes padded with NUL."""
-    return [bytes(row).rstrip(b"\0").decode() for row in matrix]
-
-
-def names_of_rows(problem: Problem) -> list[str]:
-    """Names of all rows of a problem."""
-    return name_list(row_names(problem.rows)) if problem.rows else []
+def _names_of(problem: Problem) -> tuple[list[str], list[str]]:
+    """Names of all columns and rows of a problem."""
+    columns, rows = column_names(problem.instance, problem.blocks), row_names(problem.rows)
+    return decode_names(columns).tolist(), decode_names(rows).tolist()
 
 
 def problem_algebra(problem: Problem) -> Algebra:
     """The intended content of an LP or MPS file, from the problem's arrays; the last column is fixed to 1."""
     form = CanonicalForm(problem)
     n, ones = problem.n_columns, np.ones(1)
+    columns, rows = _names_of(problem)
     at, value = row_terms(problem.rows, 1)
     products, product = row_terms(problem.rows, 2)
     return Algebra.of(
-        [*name_list(column_names(problem.instance, problem.blocks)), form.one.decode()],
-        names_of_rows(problem) or ["c_ONE"],
+        [*columns, form.one.decode()],
+        rows or ["c_ONE"],
         lower=np.concatenate([problem.lower, ones]),
         upper=np.concatenate([problem.upper, ones]),
         integer=np.concatenate([problem.integer, ones == 0]),
@@ -129,7 +126,7 @@ def _value_difference(label: str, values: Floats, expected: Floats, accuracy: fl
 
 def behaviour_difference(reported: Behaviour, problem: Problem, points: Points) -> str:
     """First difference between the behaviour of a file and the problem; empty without one."""
-    columns, rows = name_list(column_names(problem.instance, problem.blocks)), names_of_rows(problem)
+    columns, rows = _names_of(problem)
     lacking = set(columns) - set(reported.columns) if reported.may_lack else set()
     wanted = [name for name in columns if name not in lacking & _columns_in_no_term(problem, columns)]
     strangers = _name_difference(reported.columns, wanted, "columns") or _name_difference(

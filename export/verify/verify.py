@@ -21,7 +21,7 @@ import numpy as np
 
 from ...models.errors import CrossfieldError, InputError, UnsupportedBySolverError, naming
 from ...models.field.field import CrossField
-from ...models.formulations.names import column_names
+from ...models.formulations.names import column_names, decode_names
 from ...models.formulations.problem import Problem
 from ...models.input_limits import MAX_SOLUTION
 from ...models.orthogonal.energy import OrthogonalEnergy, field_of, integers_of
@@ -39,7 +39,7 @@ from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..solving.local import SolveFiles, Solvers
 from ..statuses import Status
 from .checks import Check, Verdict, Verification
-from .comparison import algebra_difference, behaviour_difference, name_list
+from .comparison import algebra_difference, behaviour_difference
 from .leeway import objective_leeway
 
 RESULT: Final = "verify.json"
@@ -172,7 +172,8 @@ def _test_points(problem: Problem) -> Points:
     feasible = [problem.point(random_field(problem, seed)) for seed in range(FIELD_POINTS)]
     values = np.concatenate([anywhere, np.array(feasible)])
     objective = np.array([problem.objective_value(point) for point in values])
-    return Points(name_list(column_names(problem.instance, problem.blocks)), values, objective, RANDOM_POINTS)
+    names = decode_names(column_names(problem.instance, problem.blocks)).tolist()
+    return Points(names, values, objective, RANDOM_POINTS)
 
 
 def random_field(problem: Problem, seed: int) -> CrossField:

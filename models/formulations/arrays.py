@@ -13,7 +13,7 @@ from scipy import sparse
 from ..errors import SolverError, UnsupportedBySolverError
 from ..instance.domain import Bools, Floats, Ints
 from .families import ANY_DEGREE, PlacedFamily, merge_terms, row_sides
-from .names import Bytes
+from .names import Bytes, decode_names
 
 QUADRATIC: Final = 2
 """Greatest degree of what arrays hold."""
@@ -121,8 +121,8 @@ def problem_arrays(
         lower=columns[0].copy(),
         upper=columns[1].copy(),
         integer=columns[2].copy(),
-        column_names=_decode_names(names[0]) if names else None,
-        row_names=_decode_names(names[1]) if names else None,
+        column_names=decode_names(names[0]) if names else None,
+        row_names=decode_names(names[1]) if names else None,
         nonlinear=tuple(family.family.tag for family in nonlinear),
         family_rows=places,
     )
@@ -162,10 +162,6 @@ def _rows_by_tag(families: Iterable[PlacedFamily]) -> dict[str, slice]:
         rows[family.family.tag] = slice(start, start + family.count)
         start += family.count
     return rows
-
-
-def _decode_names(names: Bytes) -> Names:
-    return np.ascontiguousarray(names).view(f"S{names.shape[1]}").ravel().astype(np.str_)
 
 
 def check_highs(problem_class: str, *, convex: bool) -> None:

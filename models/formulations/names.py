@@ -122,6 +122,11 @@ def column_names(instance: Instance, blocks: dict[str, Block]) -> Bytes:
     return stack_names([element_names(instance, block.name, block.over) for block in blocks.values()])
 
 
+def decode_names(names: Bytes) -> NDArray[np.str_]:
+    """Names as text, shape (count,), from rows of bytes padded with NUL."""
+    return np.ascontiguousarray(names).view(f"S{names.shape[1]}").ravel().astype(np.str_)
+
+
 def family_names(family: PlacedFamily) -> Bytes:
     """Names of the rows of a family, shape (count, width), no padding."""
     names = element_names(family.instance, family.family.tag, family.family.over)

@@ -21,9 +21,8 @@ from crossfield.export.library.ledger.ledger import (
     write_ledger,
 )
 from crossfield.export.library.ledger.points import complete_point
-from crossfield.export.verify.comparison import name_list
 from crossfield.models.errors import InputError
-from crossfield.models.formulations.names import column_names
+from crossfield.models.formulations.names import column_names, decode_names
 from libraries import OPEN, content, improve, library_of
 from places import DATA, SOLUTIONS
 
@@ -189,7 +188,7 @@ def point_of(lib):
 
 def write_point(problem, point, path):
     """Write the point as a list of names and values."""
-    pairs = zip(name_list(column_names(problem.instance, problem.blocks)), point.tolist(), strict=True)
+    pairs = zip(decode_names(column_names(problem.instance, problem.blocks)), point.tolist(), strict=True)
     path.write_text("=obj= 0\n" + "".join(f"{name} {value!r}\n" for name, value in pairs))
 
 
