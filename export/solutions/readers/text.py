@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import repeat
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,7 +37,6 @@ if TYPE_CHECKING:  # the driver of a solver needs neither the writers nor the fo
 Bytes = NDArray[np.bytes_]
 
 _CONTROLS = re.compile(r"[\x00-\x1f\x7f]+")
-_NOT_A_NUMBER: Final = "is not a number"
 
 
 @cache
