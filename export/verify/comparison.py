@@ -6,14 +6,14 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 import numpy as np
+from scipy import sparse
 
-from ...models.formulations.arrays import row_terms
 from ...models.formulations.names import column_names, decode_names, row_names
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Bools, Floats
 from ..programs.model_content import Algebra, Behaviour, Points, positions_of
 from ..writing.canonical import CanonicalForm
-from ..writing.terms import merged_terms
+from ..writing.terms import Terms, merged_terms, terms_of_triangle
 
 VALUES: Final = 1e-9
 """Relative difference up to which values at a point agree: sums may have another order."""
@@ -27,23 +27,21 @@ def _names_of(problem: Problem) -> tuple[list[str], list[str]]:
 
 def problem_algebra(problem: Problem) -> Algebra:
     """The intended content of an LP or MPS file, from the problem's arrays; the last column is fixed to 1."""
-    form = CanonicalForm(problem)
-    n, ones = problem.n_columns, np.ones(1)
-    columns, rows = _names_of(problem)
-    at, value = row_terms(problem.rows, 1)
-    products, product = row_terms(problem.rows, 2)
+    arrays, (columns, rows) = problem.to_arrays(names=False), _names_of(problem)
+    upper, matrix = sparse.triu(arrays.q).tocoo(), arrays.a.tocoo()
+    fixed = Terms(np.array([[0, problem.n_columns]]), np.ones(1))
     return Algebra.of(
-        [*columns, form.one.decode()],
+        [*columns, CanonicalForm(problem).one.decode()],
         rows or ["c_ONE"],
-        lower=np.concatenate([problem.lower, ones]),
-        upper=np.concatenate([problem.upper, ones]),
-        integer=np.concatenate([problem.integer, ones == 0]),
-        costs=np.concatenate([form.costs, form.constant * ones]),
-        row_lower=form.row_lower if problem.rows else ones,
-        row_upper=form.row_upper if problem.rows else ones,
-        quadratic=merged_terms(*form.products(), indices=2, products=2),
-        matrix=merged_terms(at if problem.rows else [[0, n]], value if problem.rows else [1.0], indices=2),
-        row_quadratic=merged_terms(products, product, indices=3, products=2),
+        lower=np.append(arrays.lower, 1.0),
+        upper=np.append(arrays.upper, 1.0),
+        integer=np.append(arrays.integer, False),
+        costs=np.append(arrays.c, arrays.constant),
+        row_lower=arrays.row_lower if rows else np.ones(1),
+        row_upper=arrays.row_upper if rows else np.ones(1),
+        quadratic=terms_of_triangle(upper.row, upper.col, upper.data),
+        matrix=merged_terms(np.stack(matrix.coords, axis=1), matrix.data, indices=2) if rows else fixed,
+        row_quadratic=merged_terms(arrays.row_products, arrays.row_factors, indices=3, products=2),
     )
 
 
