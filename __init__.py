@@ -71,14 +71,14 @@ if TYPE_CHECKING:
     from .models.proof.certificate import write_certificate as write_certificate
     from .models.proof.descent.record import Proof as Proof
     from .models.proof.prove import prove as prove
+    from .models.samples.samples import sample as sample
+    from .models.samples.samples import samples as samples
     from .models.search.greedy import greedy_field as greedy_field
     from .models.search.improvement import improved_field as improved_field
     from .models.search.search import Search as Search
     from .models.search.search import search as search
     from .models.sketch.random_strokes import random_instance as random_instance
     from .models.sketch.read import read_sketch as read_sketch
-    from .models.sketch.samples import sample as sample
-    from .models.sketch.samples import samples as samples
     from .models.sketch.surfaces import analytic as analytic
     from .models.smooth.bend import bend_field as bend_field
     from .models.smooth.polyvector import polyvector_field as polyvector_field
@@ -137,8 +137,8 @@ _HOME: Final = {
     "read_sketch": ".models.sketch.read",
     "read_solution": ".export.solutions.solution",
     "run": ".export.runs.run",
-    "sample": ".models.sketch.samples",
-    "samples": ".models.sketch.samples",
+    "sample": ".models.samples.samples",
+    "samples": ".models.samples.samples",
     "search": ".models.search.search",
     "solve": ".export.solving.local",
     "surface": ".models.surface.lift",

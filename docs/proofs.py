@@ -35,7 +35,8 @@ from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.checkers import check_certificate
 from crossfield.models.proof.descent.descent import MOST_LABELS
 from crossfield.models.proof.prove import prove
-from crossfield.models.sketch.samples import SAMPLES, sample
+from crossfield.models.samples.samples import sample
+from crossfield.models.sketch.samples import SAMPLES
 from drawings import PROVERS, SUFFIXES, Sketch, drawings_of, optimum, run_command, sketches, tiny_instances
 from machine import machine_facts
 from make import csv_text, generated_line

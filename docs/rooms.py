@@ -17,8 +17,8 @@ GROUND: Final = "models"
 """The folder whose top level every folder uses; it is left out of the table."""
 
 ORDER: Final = (
-    "models", "models/processes", "models/instance", "models/mesh", "models/sketch", "models/field",
-    "models/smooth", "models/surface", "models/orthogonal", "models/formulations",
+    "models", "models/processes", "models/instance", "models/mesh", "models/sketch", "models/samples",
+    "models/field", "models/smooth", "models/surface", "models/orthogonal", "models/formulations",
     "models/search", "models/proof/checkers", "models/proof/bound", "models/proof/descent", "models/proof",
     "templates",
     "export/writing", "export/formats", "export", "export/solutions/readers",

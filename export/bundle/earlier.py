@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ...models.errors import CrossfieldError
-from ...models.field.field import CrossField, Norm
+from ...models.field.field import CrossField
 from ...models.field.file import SAME, earlier_field
 from ...models.formulations.problem import Problem
 from ...models.instance.instance import Instance
@@ -75,20 +75,6 @@ def keep_better_field(
     if found is not None and was >= found - SAME * (1 + abs(found)):
         return None
     notice(kept_notice(name, f"energy {was:.6g}", "no field" if found is None else f"energy {found:.6g}"))
-    new.kept.add(name)
-    return earlier
-
-
-def keep_better_bound(
-    new: NewResults, name: str, bound: float | None, notice: Progress, *, on: Instance, norm: Norm = 2
-) -> float | None:
-    """Keep an earlier certificate of a higher bound than the one proven now, if any; return that bound."""
-    from ...models.proof.certificate import earlier_bound  # it loads Numba
-
-    earlier = earlier_bound(new.folder / name, on, norm)
-    if earlier is None or (bound is not None and earlier <= bound):
-        return None
-    notice(kept_notice(name, f"bound {earlier:.6g}", "no bound" if bound is None else f"bound {bound:.6g}"))
     new.kept.add(name)
     return earlier
 

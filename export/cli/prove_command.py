@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
 import typer
 
 from ...models.errors import CrossfieldError
-from ...models.written_files import is_unchanged
+from ...models.written_files import is_unchanged, kept_notice
 from . import options
 from .inputs import find_drawing, read_start
 from .output import print_line, print_notice, show_facts, show_progress
@@ -145,11 +145,11 @@ def _keep_better(
     The report then has the energy of the one, and levels and bound of the other.
     """
     from ...models.proof.checkers.check_certificate import gap_of, status_of
-    from ..bundle.earlier import keep_better_bound, keep_better_field
+    from ..bundle.earlier import keep_better_field
 
     instance, norm = proof.field.instance, proof.norm
     bound = None if document["status"] == UNPROVEN else document["bound"]
-    higher = keep_better_bound(new, names.certificate, bound, print_notice, on=instance, norm=norm)
+    higher = _keep_better_bound(new, names.certificate, bound, on=instance, norm=norm)
     lower = keep_better_field(
         new,
         names.field,
@@ -214,3 +214,19 @@ def _check_certificate(path: Path, printing: options.PrintOptions) -> None:
     printing.show_facts(
         certificate.field.instance.summary, proof_facts(certificate), "the certificate is valid"
     )
+
+
+def _keep_better_bound(
+    new: NewResults, name: str, bound: float | None, *, on: Instance, norm: NormOfField = 2
+) -> float | None:
+    """Keep an earlier certificate of a higher bound than the one proven now, if any; return that bound."""
+    from ...models.proof.certificate import earlier_bound
+
+    earlier = earlier_bound(new.folder / name, on, norm)
+    if earlier is None or (bound is not None and earlier <= bound):
+        return None
+    print_notice(
+        kept_notice(name, f"bound {earlier:.6g}", "no bound" if bound is None else f"bound {bound:.6g}")
+    )
+    new.kept.add(name)
+    return earlier

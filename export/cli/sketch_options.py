@@ -132,7 +132,7 @@ class SketchOptions:
         )
 
     def _make_sample(self, name: str) -> Instance:
-        from ...models.sketch.samples import sample
+        from ...models.samples.samples import sample
 
         if self.mask is not None:
             raise InputError(f"the sample {name} has its own mask; leave --mask out")

@@ -7,7 +7,7 @@ from typing import Any
 from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.catalogue import FORMULATIONS, declare
 from ...models.formulations.problem import Problem
-from ...models.sketch.samples import samples
+from ...models.samples.samples import samples
 from ..formats.registry import FORMATS, problem_in_format
 from ..runs.methods import METHODS
 from ..solutions.readers.registry import READERS

@@ -19,8 +19,8 @@ from ..processes.child import Child, KilledError
 from ..processes.child_program import WorkerError
 from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, Over, Progress, never, silent
+from ..samples.samples import sample
 from ..search.greedy import greedy_field
-from ..sketch.samples import sample
 from ..storage import temporary_folder
 from .bound import orthogonal_dual
 from .bound.dual import Dual

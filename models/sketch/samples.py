@@ -8,9 +8,7 @@ from typing import Final, Literal
 
 from ..arguments import check_choice
 from ..errors import InputError
-from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
-from ..mesh.read import mesh_sample
-from ..mesh.shapes import MESHES
+from ..instance.instance import Gauge, Instance
 from .read import DEFAULT_SIZE, Silhouette, check_silhouette, check_size, instance_of_drawing
 from .surfaces import analytic
 from .svg import read_svg
@@ -51,56 +49,19 @@ SAMPLES: Final[dict[str, Sample]] = {
 }
 
 
-def samples() -> list[Sample]:
-    """Names, kinds and descriptions of the built-in samples: drawings, surfaces, meshes."""
-    return [*SAMPLES.values(), *(Sample(name, "mesh", text) for name, (text, _) in MESHES.items())]
-
-
-def sample(
+def drawn_sample(
     name: str,
-    size: int | None = None,
+    size: int | None,
     *,
-    gauge: Gauge = "strokes",
-    stroke_weight: float = STROKE_WEIGHT,
-    skew_weight: float = SKEW_WEIGHT,
+    gauge: Gauge,
+    stroke_weight: float,
+    skew_weight: float,
     silhouette: Silhouette = "none",
 ) -> Instance:
-    """Instance of a built-in sample.
-
-    Parameters
-    ----------
-    name
-        A name in `samples()`.
-    size
-        Pixels on the longer side of the grid, 1 to 4096; 24 by default. A mesh has none.
-    gauge
-        Window of alpha, as in `Instance`.
-    stroke_weight, skew_weight
-        Weights that mean the same on every grid, as in `Instance.with_weights`.
-    silhouette
-        `outer` or `none`, as in `read_sketch`; only for drawn samples.
-
-    Returns
-    -------
-    Instance
-        The instance. `analytic` also returns the exact answer of a computed sample.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, and for a size out of range.
-    InstanceError
-        For a weight out of range.
-
-    """
-    if name in MESHES:
-        if size is not None or silhouette != "none":
-            raise InputError(f"{name} is a mesh with its own faces; leave size and silhouette out")
-        return mesh_sample(name, gauge, stroke_weight)
+    """Instance of a built-in sketch or surface, as `sample` describes it. Raises InputError."""
     size = DEFAULT_SIZE if size is None else size
     check_size(size)
     check_silhouette(silhouette)
-    check_choice("sample", name, [*SAMPLES, *MESHES])
     if SAMPLES[name].kind == "analytic":
         if silhouette != "none":
             raise InputError(f"{name} is computed, not drawn; choose the silhouette none")

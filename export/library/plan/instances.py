@@ -8,10 +8,11 @@ from typing import cast
 
 from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.instance.instance import Gauge, Instance
+from ....models.samples.samples import sample
 from ....models.sketch.drawing_file import parse_drawing
 from ....models.sketch.random_strokes import random_instance
 from ....models.sketch.read import instance_of_drawing, read_mask
-from ....models.sketch.samples import SAMPLES, sample
+from ....models.sketch.samples import SAMPLES
 from .recipe import InstanceRecipe
 
 

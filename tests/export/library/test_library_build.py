@@ -34,9 +34,10 @@ from crossfield.models.errors import InputError, OutputError
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.file import read_instance
+from crossfield.models.samples.samples import sample
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.sketch.publication import svg_of_curves
-from crossfield.models.sketch.samples import sample, sample_svg
+from crossfield.models.sketch.samples import sample_svg
 from crossfield.models.sketch.svg import read_svg
 from crossfield.models.written_files import LIST
 from libraries import HEAD, content, library_of, spec_of

@@ -6,7 +6,7 @@ from crossfield.export.pictures.draw import draw
 from crossfield.export.pictures.layers import SheetPlace, cut_at_border, fit_cubics
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.instance import Instance
-from crossfield.models.sketch.samples import sample
+from crossfield.models.samples.samples import sample
 from crossfield.models.smooth.polyvector import power_field
 from hypothesis import given, settings
 from hypothesis import strategies as st

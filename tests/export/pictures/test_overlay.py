@@ -14,9 +14,9 @@ from crossfield.export.runs.run import run
 from crossfield.models.errors import InputError
 from crossfield.models.field.file import write_field
 from crossfield.models.instance.file import read_instance, write_instance
+from crossfield.models.samples.samples import sample
 from crossfield.models.sketch.pen_strokes import read_curves
 from crossfield.models.sketch.read import read_sketch
-from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import power_field
 from defusedxml import ElementTree
 from layered import SVG, layers_of, lines_in, numbers

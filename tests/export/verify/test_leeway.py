@@ -7,7 +7,7 @@ from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.verify.leeway import objective_leeway
 from crossfield.export.verify.verify import random_field
 from crossfield.models.formulations.problem import Problem, formulate
-from crossfield.models.sketch.samples import sample
+from crossfield.models.samples.samples import sample
 
 CHOSEN = {"alpha", "beta", "p", "p1", "p2"}
 NAMES = [name for name in SKEWED if name != "qp-fixed"]

@@ -35,7 +35,7 @@ from crossfield.models.formulations.problem import Problem, formulate
 from crossfield.models.instance.instance import Instance
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.processes.limits import Limits
-from crossfield.models.sketch.samples import sample
+from crossfield.models.samples.samples import sample
 from loops import for_each
 
 pytestmark = pytest.mark.oracles

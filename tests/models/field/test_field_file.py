@@ -12,7 +12,7 @@ from crossfield.models.field.file import read_field, write_field
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.file import read_instance, write_instance
 from crossfield.models.instance.instance import Instance
-from crossfield.models.sketch.samples import sample
+from crossfield.models.samples.samples import sample
 from crossfield.models.smooth.polyvector import power_field
 from damage import change, full_instance, refused, same_instance, without
 from exhaustive import random_field

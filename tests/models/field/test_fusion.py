@@ -10,9 +10,9 @@ from crossfield.models.field.fusion import fuse_fields
 from crossfield.models.field.jumps import free_jumps
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import MOST_WEIGHT
+from crossfield.models.samples.samples import sample
 from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.greedy import greedy_field
-from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.polyvector import polyvector_field
 from exhaustive import random_instance, sketch
 

@@ -10,9 +10,9 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
+from crossfield.models.samples.samples import sample, samples
 from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.reproducible_angles import reproducible_field
-from crossfield.models.sketch.samples import sample, samples
 from crossfield.models.smooth.polyvector import power_field
 from exhaustive import random_instance
 from hypothesis import given, settings

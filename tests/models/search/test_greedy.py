@@ -9,12 +9,12 @@ import pytest
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.symmetries import mirrored, transposed, turned
+from crossfield.models.samples.samples import sample
 from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.nearest_stroke import nearest_strokes
 from crossfield.models.search.search import search
 from crossfield.models.search.starts import first_field
-from crossfield.models.sketch.samples import sample
 from crossfield.models.smooth.bend import bend_field
 from crossfield.models.smooth.polyvector import polyvector_field, power_field
 from exhaustive import assert_feasible, exact, random_instance, sketch

@@ -9,7 +9,8 @@ from crossfield.export.runs.report import Report
 from crossfield.export.runs.run import START
 from crossfield.models.errors import InputError
 from crossfield.models.instance.symmetries import turned
-from crossfield.models.sketch.samples import sample_svg, samples
+from crossfield.models.samples.samples import samples
+from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
 from scipy import ndimage
 

@@ -3,7 +3,7 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.sketch.samples import samples
+from crossfield.models.samples.samples import samples
 from crossfield.models.sketch.thinning import thin_shape
 from PIL import Image, ImageDraw
 from scipy import ndimage

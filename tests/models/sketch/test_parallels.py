@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+from crossfield.models.samples.samples import samples
 from crossfield.models.sketch.drawing_file import parse_drawing
 from crossfield.models.sketch.parallels import find_parallels, leave_out_parallels
 from crossfield.models.sketch.read import instance_of_drawing
-from crossfield.models.sketch.samples import sample_svg, samples
+from crossfield.models.sketch.samples import sample_svg
 from crossfield.models.sketch.svg import read_svg
 from places import ROOT
 

@@ -7,7 +7,8 @@ import pytest
 from crossfield.models.errors import InputError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.angles import line_difference
-from crossfield.models.sketch.samples import SAMPLES, sample, sample_svg, samples
+from crossfield.models.samples.samples import sample, samples
+from crossfield.models.sketch.samples import SAMPLES, sample_svg
 from crossfield.models.sketch.surfaces import SURFACES
 from crossfield.models.smooth.polyvector import power_field
 from loops import for_each

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.instance.instance import Instance
-from crossfield.models.sketch.samples import sample
+from crossfield.models.samples.samples import sample
 from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
 from exhaustive import sketch
 from loops import for_each
