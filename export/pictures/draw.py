@@ -20,7 +20,7 @@ from ...models.errors import DomainError, InputError
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
-from ...models.storage import write_bytes
+from ...models.storage import require_suffix, write_bytes
 from ...models.surface.surface import Surface
 from ...models.written_files import check_targets
 from . import panels
@@ -153,10 +153,7 @@ def draw(
     """
     path = Path(path)
     suffix = path.suffix.lower()
-    if suffix not in SUFFIXES:
-        raise InputError(
-            f"a picture cannot be written as {path.suffix!r}; use one of {', '.join(SUFFIXES)}", file=path
-        )
+    require_suffix(path, *SUFFIXES)
     reads = [underlay] if isinstance(underlay, str | Path) else []
     check_targets(path.parent, [path.name], reads=reads, force=force)
     if isinstance(subject, Surface):

@@ -29,7 +29,7 @@ from ..instance.file import (
 from ..instance.grid import Grid
 from ..instance.instance import Instance
 from ..instance.mesh import Mesh
-from ..storage import read_bytes, replacing
+from ..storage import read_bytes, replacing, require_suffix
 from ..written_files import FORCE, check_targets, is_unchanged
 from .exchange import TEXT_READERS, TEXT_WRITERS, most_text_bytes, to_obj, to_sings
 from .field import CrossField, Norm
@@ -76,12 +76,16 @@ def write_field(field: CrossField, path: str | Path, *, force: bool = False) -> 
 
     """
     path = Path(path)
-    write = _look_up_suffix(_WRITERS, path, "written")
+    require_suffix(path, *_WRITERS)
     names = field_names(path.name)
     check_targets(path.parent, names, force=force)
     if not force and path.suffix.lower() != ".rosy":  # its crosses have right angles, so another energy
         _check_not_worse(field, path)
-    contents: list[Callable[[CrossField], bytes]] = [write, lambda field: to_obj(field.instance), to_sings]
+    contents: list[Callable[[CrossField], bytes]] = [
+        _WRITERS[path.suffix.lower()],
+        lambda field: to_obj(field.instance),
+        to_sings,
+    ]
     with ExitStack() as stack:  # the files get their names together, at its end
         for name, content in zip(names, contents, strict=False):
             stack.enter_context(replacing(path.with_name(name), force=force)).write(content(field))
@@ -150,19 +154,9 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
             if on is None:
                 raise InputError("holds no instance; give the instance: read_field(path, on=instance)")
             return TEXT_READERS[path.suffix.lower()](read_bytes(path, most_text_bytes(on)), on)
-        read = _look_up_suffix(_READERS, path, "read", *TEXT_READERS)
-        field = read(read_bytes(path, MAX_ARCHIVE))
+        require_suffix(path, *_READERS, *TEXT_READERS)
+        field = _READERS[path.suffix.lower()](read_bytes(path, MAX_ARCHIVE))
         return field if on is None else field.on_instance(on)
-
-
-def _look_up_suffix(table: dict[str, _Entry], path: Path, verb: str, *others: str) -> _Entry:
-    entry = table.get(path.suffix.lower())
-    if entry is None:
-        raise InputError(
-            f"a field cannot be {verb} as {path.suffix!r}; choose one of {', '.join([*table, *others])}",
-            file=path,
-        )
-    return entry
 
 
 def _field_to_npz(field: CrossField) -> bytes:

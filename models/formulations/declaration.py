@@ -215,8 +215,7 @@ class Declaration:
         """The default options and the chosen ones. Raises FormulationError for a wrong option."""
         known = Options.__dataclass_fields__
         for key, value in chosen.items():
-            if key not in known:
-                raise FormulationError(f"there is no option {key!r}; the options are {', '.join(known)}")
+            check_choice("option", key, known, FormulationError)
             if key not in self.option_names and value != getattr(self.defaults, key):
                 raise FormulationError(
                     f"{self.name} has no option {key}; it is always {getattr(self.defaults, key)}"

@@ -20,7 +20,7 @@ from ..errors import InputError, MeshError, quote_line, shortened
 from ..input_limits import MAX_BYTES
 from ..instance.domain import Floats, Ints
 from ..instance.mesh import MOST_FACES, Mesh
-from ..storage import read_bytes
+from ..storage import read_bytes, require_suffix
 
 _MOST_VERTICES: Final = 3 * MOST_FACES
 _HEAD: Final = 1 << 16  # bytes in which a file states the numbers of its vertices and faces
@@ -32,12 +32,8 @@ def read_mesh_file(path: Path) -> tuple[Mesh, Ints]:
 
     Raises InputError for another suffix or content, or a file that is too large, and MeshError for polygons.
     """
-    read = MESH_READERS.get(path.suffix.lower())
-    if read is None:
-        raise InputError(
-            f"has the suffix {path.suffix!r}, which is no mesh; give one of {', '.join(MESH_READERS)}"
-        )
-    return read(read_bytes(path, MAX_BYTES, "simplify the mesh"))
+    require_suffix(path, *MESH_READERS)
+    return MESH_READERS[path.suffix.lower()](read_bytes(path, MAX_BYTES, "simplify the mesh"))
 
 
 def _read_obj(data: bytes) -> tuple[Mesh, Ints]:

@@ -83,7 +83,7 @@ def test_options_apply_where_a_formulation_has_them(tmp_path):
     assert options["milp-mccormick"]["facet"] == "printed"
     assert options["miqp-exact"] == {"facet": "hull", "stroke_norm": 2, "beta_norm": 2, "relax": True}
     assert options["qp-fixed"]["relax"] is False
-    with pytest.raises(FormulationError, match="there is no option 'nonsense'; the options are facet"):
+    with pytest.raises(FormulationError, match="there is no option 'nonsense'; choose one of facet"):
         write_all(make_instance(), tmp_path, options={"nonsense": 1})
 
 
