@@ -292,7 +292,7 @@ def require_suffix(path: Path, *allowed: str) -> None:
     """Raise InputError for a file with none of the allowed suffixes."""
     if path.suffix.lower() not in allowed:
         has = f"the suffix {path.suffix!r}" if path.suffix else "no suffix"
-        raise InputError(f"has {has}, which selects no format; use {', '.join(allowed)}", file=path)
+        raise InputError(f"has {has}, which selects no format; choose one of {', '.join(allowed)}", file=path)
 
 
 def read_bytes(path: str | Path, most: int | None = None, remedy: str = "give a smaller file") -> bytes:

@@ -93,12 +93,12 @@ def test_json_of_a_mesh_states_each_jump_with_its_faces(tmp_path):
 
 def test_unknown_ending_is_refused_before_anything_is_written(field, tmp_path):
     for name in ("field.txt", "field", "field.obj"):
-        with pytest.raises(InputError, match=r"selects no format; use \.npz, \.json, \.rawfield"):
+        with pytest.raises(InputError, match=r"selects no format; choose one of \.npz, \.json, \.rawfield"):
             write_field(field, tmp_path / name)
     refused(
         read_field,
         tmp_path / "a.obj",
-        "has the suffix '.obj', which selects no format; use .npz, .json, .rawfield",
+        "has the suffix '.obj', which selects no format; choose one of .npz, .json, .rawfield",
         InputError,
     )
     assert list(tmp_path.iterdir()) == []

@@ -234,7 +234,7 @@ PLY = (
         ("a.obj", "v 0 0 x\nf 1 1 1\n", "has a vertex that is no number"),
         ("a.obj", "v 0 0 0\nf 1 1 a\n", "line 2: 'f 1 1 a' is no OBJ"),
         ("a.obj", "v 0 0 0\nf 0 1 1\n", "line 2: 'f 0 1 1' is no OBJ"),
-        ("a.step", "ISO-10303-21;", "has the suffix '.step', which selects no format; use .obj"),
+        ("a.step", "ISO-10303-21;", "has the suffix '.step', which selects no format; choose one of .obj"),
     ],
 )
 def test_files_that_are_no_triangle_meshes_are_named(tmp_path, name, text, message):
