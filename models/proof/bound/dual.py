@@ -53,7 +53,7 @@ from .pruning import (
 from .state import Clusters, Indices, State, state_on
 
 _TOLERANCE: Final = 1e-7  # excess over the energy with which labels still survive, relative to 1 + it
-_LOST: Final = 0.1  # share of the gap that rounding may cost at most; a fifth of it is usual
+_LOST: Final = 0.3  # share of the gap that rounding may cost at most; a fifth of it is usual
 _TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
 _LEVELS: Final = 64  # more than usual; the checker allows for the sides of domains at each
 _BEYOND: Final = 1.5  # step of tables before the last update: 29 % more per pass on mouse at 48 pixels;

@@ -41,6 +41,7 @@ _SLIGHT: Final = 1e-2  # deduction up to which a stroke counts where its box exc
 _TRIAL: Final = 50  # nodes after which this part of the way to the energy must lie behind the bound
 _TRIAL_PART: Final = 0.6
 _SECOND: Final = 0.2  # part of the difference between the least costs of two jumps in a pair's rank
+_DIGITS: Final = 2.0**40  # per unit of multipliers: fewer digits take less space, and lose some 1e-10
 _MARGIN: Final = 2e-9  # radians by which the boxes are wider here; those of the checker are wider by less
 
 
@@ -191,6 +192,7 @@ def _minimise_on_piece(
     )  # fmt: skip
     multipliers[: 2 * m], multipliers[2 * m + n :] = fit.multipliers[: 2 * m], fit.multipliers[-n:]
     multipliers[2 * m + at] = fit.multipliers[2 * m : -n]
+    multipliers = np.round(multipliers * _DIGITS) / _DIGITS
     return _PieceMinimum(fit.x, linear_bound(terms, step, piece, multipliers), multipliers)
 
 
