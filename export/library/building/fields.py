@@ -12,13 +12,12 @@ from typing import Final
 
 import numpy as np
 
-from ....models.field.field import AbsoluteNorm, CrossField, Norm
+from ....models.field.field import CrossField, Norm
 from ....models.formulations.problem import Problem, formulate, with_integers_fixed
 from ....models.instance.angles import HALF
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import write_certificate
 from ....models.proof.descent.record import Proof
-from ....models.search.angle_program import alternate_absolute
 from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.reproducible_angles import reproducible_field
@@ -63,10 +62,7 @@ def search_fields(
     searched = _search_in_2norm(instance)
     low, proven = _prove_norms(searched, recipe, sent)
     if instance.orthogonal:
-        best = min([searched, *low], key=lambda known: known.field.energy().total).field
-        norms: tuple[AbsoluteNorm, ...] = (1, "mixed")
-        fits = [KnownField(alternate_absolute(best, norm), provenance_by("best angles")) for norm in norms]
-        return baseline, [searched, *low, *fits], proven
+        return baseline, [searched, *low], proven
     fitted = improve_in_1norm(searched.field, recipe.rung)
     staged = [KnownField(reproducible_field(known.field), provenance_by("two stages")) for known in fitted]
     return baseline, [searched, *low, *fitted, *staged], proven

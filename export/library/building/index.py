@@ -124,7 +124,9 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
     ]
     written = {file["format"] for sidecar in sidecars for file in sidecar["files"]}
     certified = {
-        sidecar["rung"] for sidecar in sidecars if any("certificate" in bound for bound in sidecar["bounds"])
+        sidecar["source"]["kind"]
+        for sidecar in sidecars
+        if any("certificate" in bound for bound in sidecar["bounds"])
     }
     return {
         "spec": spec,
@@ -143,7 +145,7 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
         "packed": any(file["name"].endswith(".gz") for sidecar in sidecars for file in sidecar["files"]),
         "tightened": sum("tightened" in sidecar for sidecar in sidecars),
         "certified": bool(certified),
-        "orthogonal": any(rung.orthogonal for rung in spec.rungs if rung.name in certified),
+        "orthogonal": "mesh" in certified,
         "proven_by": _formulations_by_norm(spec),
         "example": sidecars[0],
     }

@@ -147,7 +147,9 @@ def _instances(sketch: Sketch, rung: Rung, norms: tuple[Norm, ...]) -> list[Inst
             seed,
             gauge,
             # Bounds are weak under the gauge `box`. Orthogonal crosses have proofs in the 2-norm alone.
-            prove=tuple(norm for norm in norms if gauge == "strokes" and (norm == 2 or not rung.orthogonal)),
+            prove=tuple(
+                norm for norm in norms if gauge == "strokes" and (norm == 2 or not sketch.orthogonal)
+            ),
             added=max(sketch.added, rung.added),
         )
         for size in sketch.sizes_on(rung)
@@ -163,8 +165,10 @@ def _instance_name(sketch: Sketch, size: int, seed: int | None, gauge: str) -> s
 
 
 def _entries(recipe: InstanceRecipe, rung: Rung, formulations: tuple[str, ...]) -> tuple[EntryRecipe, ...]:
-    chosen = [(name, facet, False) for name, facet in rung.entries(formulations, recipe.gauge)]
-    if recipe.gauge == "strokes":  # certificates are of this gauge
+    orthogonal = recipe.sketch.orthogonal
+    entries = rung.entries(formulations, recipe.gauge, orthogonal=orthogonal)
+    chosen = [(name, facet, False) for name, facet in entries]
+    if recipe.gauge == "strokes" and not orthogonal:  # certificates with windows are of these
         chosen += [(name, "hull", True) for name in rung.tightened]
     return tuple(
         EntryRecipe(

@@ -21,6 +21,7 @@ from ....models.formulations.catalogue import (
     FORMULATIONS,
     declaration_of,
     declare,
+    norm_of,
     reason_against,
     short_names,
 )
@@ -39,7 +40,8 @@ from .seeds import seeds_document, seeds_of
 
 FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
-RUNGS: Final = ("tiny", "small", "medium", "large", "mesh")  # the last one of meshes, the others of sizes
+RUNGS: Final = ("tiny", "small", "medium", "large", "mesh")
+OF_MESHES: Final = ("large", "mesh")  # rungs that take meshes, which are on the last one by default
 PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by default: most take a second
 SketchKind = Literal["sample", "file", "random", "mesh"]
 Effort = Literal["search", "none", "greedy", "proven"]
@@ -90,7 +92,7 @@ class Rung:
     """A step of the ladder: its sizes, and the formats, gauges and facets of its entries.
 
     sizes: none on the rung of meshes. tightened: formulations with a second entry in the windows that a
-    certificate leaves. formulations: of its entries, if not all of the library's.
+    certificate leaves.
     """
 
     name: str
@@ -102,20 +104,15 @@ class Rung:
     prove: bool
     added: str = ""
     tightened: tuple[str, ...] = ()
-    formulations: tuple[str, ...] = ()
 
-    @property
-    def orthogonal(self) -> bool:
-        """Whether the crosses of its instances are orthogonal."""
-        return self.name == "mesh"
-
-    def entries(self, formulations: tuple[str, ...], gauge: str) -> list[tuple[str, str]]:
+    def entries(
+        self, formulations: tuple[str, ...], gauge: str, *, orthogonal: bool
+    ) -> list[tuple[str, str]]:
         """Return formulation and facet of the entries of an instance. formulations: those of the library."""
-        chosen, orthogonal = self.formulations or formulations, self.orthogonal
         return [
             (name, facet)
             for facet in self.facets
-            for name in chosen
+            for name in formulations
             if facet in facets_of(name, gauge, orthogonal=orthogonal)
         ]
 
@@ -151,9 +148,14 @@ class Sketch:
     mask_suffix: str = ""
     added: str = ""
 
+    @property
+    def orthogonal(self) -> bool:
+        """Whether the crosses of its instances are orthogonal."""
+        return self.kind == "mesh"
+
     def sizes_on(self, rung: Rung) -> tuple[int, ...]:
         """Return its sizes on a rung: pixels, or the faces of a mesh."""
-        if self.kind == "mesh":
+        if self.orthogonal:
             return (MESHES[self.what][1]().size,)
         return dict(self.sizes).get(rung.name, rung.sizes)
 
@@ -182,7 +184,7 @@ class Sketch:
     def document(self) -> dict[str, Any]:
         """Return the sketch as a table of a specification, with its file names in a library."""
         head: dict[str, Any] = {"name": self.name, "title": self.title, "rungs": list(self.rungs)}
-        head |= {} if self.kind == "mesh" else {"sizes": {rung: list(sizes) for rung, sizes in self.sizes}}
+        head |= {} if self.orthogonal else {"sizes": {rung: list(sizes) for rung, sizes in self.sizes}}
         head |= self.origin.document() | ({"added": self.added} if self.added else {})
         head |= self.settings()
         if self.kind in ("sample", "mesh"):
@@ -267,7 +269,7 @@ def _read_document(document: dict[str, Any], folder: Path) -> Spec:
         "gauges": _read_words(document, "gauges", GAUGES, ("strokes",)),
         "facets": _read_words(document, "facets", FACETS, ("hull",)),
     }
-    kinds = {name == "mesh" for name in document["rungs"]}
+    kinds = {"mesh" in sketch for sketch in document["sketches"]}
     taken = [name for name in FORMULATIONS if any(facets_of(name, orthogonal=right) for right in kinds)]
     formulations = _read_formulations(document, "formulations", tuple(taken))
     rungs = tuple(
@@ -297,12 +299,15 @@ def _read_document(document: dict[str, Any], folder: Path) -> Spec:
 def facets_of(formulation: str, gauge: str = "strokes", *, orthogonal: bool = False) -> tuple[str, ...]:
     """Return the facets of which a formulation has entries: none on instances that it refuses.
 
-    Only hull, unless it has the option and crosses may have any angle.
+    Only hull, unless it has the option and crosses may have any angle. Formulations of orthogonal crosses in
+    other norms than the 2-norm, which certificates are in, have none.
     """
     declaration = FORMULATIONS[formulation]
     if not orthogonal:
         any_facets = FACETS if "facet" in declaration.option_names else ("hull",)
         return () if declaration.orthogonal else any_facets
+    if norm_of(declaration, declaration.options({})) != 2:
+        return ()
     smallest = smallest_problem(declare(formulation)).instance
     instance = replace(smallest, gauge=cast("Gauge", gauge), orthogonal=True)
     return () if reason_against(declare(formulation, instance), instance) else ("hull",)
@@ -314,7 +319,13 @@ def _check_entries(spec: Spec) -> None:
     rungs = [rung for rung in spec.rungs if any(rung.name in sketch.rungs for sketch in spec.sketches)]
     present = {
         rung.name: list(
-            dict.fromkeys(name for gauge in rung.gauges for name, _ in rung.entries(formulations, gauge))
+            dict.fromkeys(
+                name
+                for sketch in spec.sketches
+                if rung.name in sketch.rungs
+                for gauge in rung.gauges
+                for name, _ in rung.entries(formulations, gauge, orthogonal=sketch.orthogonal)
+            )
         )
         for rung in rungs
     }
@@ -397,9 +408,6 @@ def _read_rung(
                 f"rungs.{name}.tightened: {formulation} has fixed jumps, and no certificate is about it; "
                 "omit it"
             )
-    own = _read_formulations(table, "formulations", (), f"rungs.{name}.")
-    if unknown := [formulation for formulation in own if formulation not in formulations]:
-        raise InputError(f"rungs.{name}.formulations: {unknown[0]!r} is not in formulations; add it there")
     return Rung(
         name,
         _whole_numbers(table.get("sizes", [])),
@@ -407,7 +415,6 @@ def _read_rung(
         prove=prove,
         added=table.get("added", ""),
         tightened=tightened,
-        formulations=own,
         **words,
     )
 
@@ -419,12 +426,13 @@ def _whole_numbers(numbers: list[float]) -> tuple[int, ...]:
 
 def _read_sketch(table: dict[str, Any], place: str, folder: Path, rungs: tuple[Rung, ...]) -> Sketch:
     name, kind = table["name"], next(kind for kind in get_args(SketchKind) if kind in table)
-    names = tuple(rung.name for rung in rungs if (rung.name == "mesh") == (kind == "mesh"))
+    suited = OF_MESHES if kind == "mesh" else RUNGS[:-1]
+    names = tuple(rung.name for rung in rungs if rung.name in suited)
     if not names:
         raise InputError(
             f"{place}{kind}: no rung takes it; add {'mesh' if kind == 'mesh' else 'tiny'} to rungs"
         )
-    wanted = _read_words(table, "rungs", names, names, place)
+    wanted = _read_words(table, "rungs", names, names[-1:] if kind == "mesh" else names, place)
     sizes = table.get("sizes", {})
     if unknown := [rung for rung in sizes if rung not in wanted]:
         raise InputError(f"{place}sizes.{unknown[0]}: is unknown; the keys here are {', '.join(wanted)}")
