@@ -31,9 +31,9 @@ MEASURED: Final = DOCS / "library.json"
 POINTS: Final = DEFAULT.parent / "known" / "points"
 CONTENTS: Final = {
     "tiny": "both gauges, both facets",
-    "small": "every norm with certificates",
-    "medium": "`crossfield prove` closes most in minutes",
-    "large": "presolve, relaxations, heuristics",
+    "small": "certificates in every norm",
+    "medium": "certificates in every norm",
+    "large": "certificates of more than 2 MB, or none; presolve, relaxations, heuristics",
     "mesh": "orthogonal crosses in the 2-norm",
 }
 STATES: Final = ("optimal", "agreed", "claimed", "open")
