@@ -373,10 +373,11 @@ def write_traps() -> None:
 
 
 def write_architecture() -> None:
-    """Write docs/architecture.svg, docs/architecture/folders.csv, and the commands by domain: as they are."""
+    """Write docs/architecture.svg, its tables, and the commands by domain, as they are now."""
     import rooms
 
     (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
+    (DOCS / "architecture" / "rooms.csv").write_text(csv_text(rooms.rooms_table(DOCS.parent)))
     (DOCS / "architecture" / "folders.csv").write_text(csv_text(rooms.table(DOCS.parent)))
     some = ", ".join(f"`{command}`" for command in SKETCHES_ONLY)
     text = f"Every command takes sketches and meshes, except these, which take sketches only: {some}."

@@ -1,34 +1,82 @@
-"""Table and picture of the folders of the package (`python docs/make.py architecture`).
+"""The core, the rooms round it, their folders and a picture of them (`python docs/make.py architecture`).
 
-Descriptions are the first lines of docstrings, and arrows are imports. Only the order of the folders and
-their places in the picture are set here.
+Descriptions are the first lines of docstrings, imports and lines are counted. Only the order of the folders,
+what rooms they belong to, what a room may use, and the places in the picture are set here.
 """
 
 from __future__ import annotations
 
 import ast
 from html import escape
+from itertools import pairwise
 from pathlib import Path
 from textwrap import wrap
-from typing import Final
+from typing import Final, NamedTuple
 
 PARTS: Final = ("models", "export", "templates")
 GROUND: Final = "models"
-"""The folder whose top level every folder uses; it is left out of the table."""
+"""The folder whose top level every folder uses; it is left out of the table of folders."""
+CORE: Final = "core"
 
-ORDER: Final = (
-    "models", "models/processes", "models/instance", "models/mesh", "models/sketch", "models/samples",
-    "models/field", "models/smooth", "models/surface", "models/orthogonal", "models/formulations",
-    "models/search", "models/proof/checkers", "models/proof/bound", "models/proof/descent", "models/proof",
-    "templates",
-    "export/writing", "export/formats", "export", "export/solutions/readers",
-    "export/solutions",
-    "export/bundle", "export/shading", "export/pictures", "export/surfaces", "export/programs",
-    "export/solving", "export/verify", "export/runs", "export/studio",
-    "export/library", "export/library/plan", "export/library/documents", "export/library/ledger",
-    "export/library/building", "export/library/contributions",
-    "export/cli",
-)  # fmt: skip
+
+class Room(NamedTuple):
+    """A part of the package that can be taken out without touching those that it does not serve.
+
+    uses: the other rooms that it may import, besides the core.
+    """
+
+    content: str
+    folders: tuple[str, ...]
+    uses: tuple[str, ...] = ()
+
+
+ROOMS: Final = {
+    CORE: Room(
+        "from an instance to files for solvers, and from their answers to a field",
+        (
+            *(
+                "models",
+                "models/processes",
+                "models/instance",
+                "models/field",
+                "models/formulations",
+                "templates",
+            ),
+            *("export/writing", "export/formats", "export", "export/solutions/readers", "export/solutions"),
+            *("export/bundle", "export/programs", "export/solving"),
+        ),
+    ),
+    "drawings": Room("instances of drawings", ("models/sketch",)),
+    "meshes": Room("instances of mesh files", ("models/mesh",)),
+    "samples": Room("built-in instances", ("models/samples",), ("drawings", "meshes")),
+    "fields": Room("fields without a solver", ("models/smooth", "models/orthogonal", "models/search")),
+    "proofs": Room(
+        "lower bounds with certificates",
+        ("models/proof/checkers", "models/proof/bound", "models/proof/descent", "models/proof"),
+        ("fields",),
+    ),
+    "surfaces": Room("surfaces over fields", ("models/surface", "export/shading"), ("fields",)),
+    "pictures": Room(
+        "pictures and files of surfaces", ("export/pictures", "export/surfaces"), ("drawings", "surfaces")
+    ),
+    "verify": Room("every program reads one model", ("export/verify",), ("fields",)),
+    "runs": Room("all methods side by side", ("export/runs",), ("fields", "proofs", "surfaces", "pictures")),
+    "studio": Room(
+        "drawing in the browser", ("export/studio",), ("drawings", "fields", "surfaces", "pictures")
+    ),
+    "library": Room(
+        "instances to share",
+        tuple(
+            f"export/library{part}"
+            for part in ("", "/plan", "/documents", "/ledger", "/building", "/contributions")
+        ),
+        ("drawings", "meshes", "samples", "fields", "proofs", "pictures"),
+    ),
+}
+ROOMS["commands"] = Room("the command line", ("export/cli",), tuple(name for name in ROOMS if name != CORE))
+"""The core first, and each room after those that it uses."""
+
+ORDER: Final = tuple(folder for room in ROOMS.values() for folder in room.folders)
 """From the ground up: a folder uses only earlier folders."""
 
 
@@ -75,161 +123,163 @@ def table(root: Path) -> list[dict[str, str]]:
     ]
 
 
-# The picture has five columns. Data goes right in the first row and left in the third; surfaces are below.
+def room_of(folder: str) -> str:
+    """The room, or the core, that a folder belongs to."""
+    return next(name for name, room in ROOMS.items() if folder in room.folders)
 
-WIDE, HIGH, GAP, LEFT = 168, 84, 78, 30
-WHOLE: Final = 5 * WIDE + 4 * GAP
-WIDTH: Final = WHOLE + 2 * LEFT
-HEIGHT: Final = 940
-PLACES: Final = {
-    "models/sketch": (0, 320), "models/instance": (1, 320), "models/formulations": (2, 320),
-    "export/writing": (3, 320), "export/formats": (4, 320),
-    "models/proof": (0, 470), "models/search": (1, 470), "templates": (3, 470), "export/bundle": (4, 470),
-    "export/pictures": (1, 620), "models/field": (2, 620), "export/solutions": (3, 620),
-    "export/solving": (4, 620),
-    "export/shading": (0, 770), "export/surfaces": (1, 770), "models/surface": (2, 770),
+
+def lines_of(root: Path, room: Room) -> int:
+    """The lines of the modules of a room, to hundreds."""
+    paths = [path for folder in room.folders for path in (root / folder).glob("*.py")]
+    return round(sum(path.read_text(encoding="utf-8").count("\n") for path in paths), -2)
+
+
+def rooms_table(root: Path) -> list[dict[str, str]]:
+    """Rows: room, content, folders, rooms that it may use, lines to hundreds."""
+    return [
+        {
+            "room": name,
+            "content": room.content,
+            "folders": " ".join(room.folders),
+            "uses": " ".join(room.uses),
+            "lines": str(lines_of(root, room)),
+        }
+        for name, room in ROOMS.items()
+    ]
+
+
+# The picture: the core in the middle, with its data going round in it, and the rooms round it.
+
+WIDE, HIGH = 168, 92
+COLUMNS: Final = (24, 264, 484, 704, 944)
+ROWS: Final = (96, 214, 338, 462, 586)
+WIDTH, HEIGHT = 1136, 702
+AROUND: Final = {
+    "runs": (1, 0), "studio": (2, 0), "library": (3, 0),
+    "verify": (0, 1), "proofs": (0, 2), "meshes": (4, 1), "samples": (4, 2), "drawings": (4, 3),
+    "fields": (0, 4), "surfaces": (2, 4), "pictures": (4, 4),
 }  # fmt: skip
+"""Column and row of each room."""
 FLOW: Final = (
-    ("models/sketch", "models/instance", "strokes,", "mask"),
-    ("models/instance", "models/formulations", "Instance", ""),
-    ("models/formulations", "export/writing", "Problem", ""),
-    ("export/writing", "export/formats", "names,", "records"),
-    ("export/formats", "export/bundle", ".nl .gms .lp .mps", ""),
-    ("export/bundle", "export/solving", "files, manifest", ""),
-    ("export/solving", "export/solutions", "solution", "file"),
-    ("export/solutions", "models/field", "Solution", ""),
-    ("models/field", "export/pictures", "CrossField", ""),
-    ("models/field", "models/surface", "CrossField", ""),
-    ("models/surface", "export/surfaces", "Surface", ""),
-    ("export/surfaces", "export/shading", "normals", ""),
-    ("models/instance", "models/search", "Instance", ""),
-    ("templates", "export/formats", "layouts", ""),
-    ("models/search", "models/field", "CrossField", ""),
-    ("models/search", "models/proof", "a field", ""),
-)
-"""Arrows of data: from, to, and the name of the data."""
+    ("models/instance", (1, 1), "Instance"), ("models/formulations", (2, 1), "Problem"),
+    ("export/writing", (3, 1), "records"), ("export/formats", (3, 2), "files"),
+    ("export/bundle", (3, 3), "sets"), ("export/solving", (2, 3), "answers"),
+    ("export/solutions", (1, 3), "Solution"), ("models/field", (1, 2), ""),
+)  # fmt: skip
+"""Folders of the core in the order of the data, their places, and the data that they pass on."""
 INK: Final = {
     "models": ("#e3edf9", "#3d6ea8"),
     "export": ("#e6f3e6", "#4b8b50"),
-    "templates": ("#f8efdc", "#b08a3c"),
+    "room": ("#ffffff", "#667788"),
 }
 STYLE: Final = """text { font-family: Inter, 'Segoe UI', Helvetica, Arial, sans-serif; fill: #223; }
 .name { font-weight: 600; font-size: 14px; } .what { font-size: 12px; }
 .data { font-size: 11.5px; font-style: italic; fill: #555; }
-.flow { stroke: #667; stroke-width: 1.6; fill: none; marker-end: url(#tip); }"""
-
-TIP: Final = """<defs><marker id="tip" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="7" markerHeight="7"
-orient="auto-start-reverse">
-<path d="M0 1L9 5L0 9z" fill="#667"/></marker></defs>"""
+.flow { stroke: #667; stroke-width: 1.6; fill: none; marker-end: url(#tip); }
+.use { stroke: #a0622d; stroke-width: 1.4; fill: none; marker-end: url(#use); }"""
+TIPS: Final = "".join(
+    f'<marker id="{name}" viewBox="0 0 10 10" refX="9" refY="5" markerWidth="7" markerHeight="7" '
+    f'orient="auto-start-reverse"><path d="M0 1L9 5L0 9z" fill="{colour}"/></marker>'
+    for name, colour in (("tip", "#667"), ("use", "#a0622d"))
+)
 
 
 def picture(root: Path) -> str:
-    """The folders and the data between them, as SVG."""
+    """The core, the rooms round it, and who may use whom, as SVG."""
+    core = ROOMS[CORE]
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" '
     parts = [
         f'{head}height="{HEIGHT}" role="img">',
-        "<title>The folders of crossfield and the flow of data through them</title>",
-        f"<style>{STYLE}</style>",
-        TIP,
+        "<title>The core of crossfield with the flow of data through it, and the rooms round it</title>",
+        f"<style>{STYLE}</style><defs>{TIPS}</defs>",
         f'<rect width="{WIDTH}" height="{HEIGHT}" fill="#ffffff"/>',
-        *bars(root),
-        *(box(root, folder) for folder in PLACES),
-        *(arrow(*step) for step in FLOW),
-        *data_at_ends(),
+        panel("room", 24, 20, WIDTH - 48, 52),
+        words(40, 42, ("commands", "name"), (size_of(root, "commands"), "data")),
+        words(40, 60, ("use the core and all rooms", "what")),
+        panel("room", COLUMNS[1] - 16, ROWS[1] - 16, 3 * 220 - 20, 3 * 124 - 4),
+        words(COLUMNS[2] - 8, ROWS[2] + 34, (CORE, "name"), (size_of(root, CORE), "data")),
+        *(
+            words(COLUMNS[2] - 8, ROWS[2] + 54 + 17 * at, (line, "what"))
+            for at, line in enumerate(wrap(core.content, 30))
+        ),
+        *(
+            box(
+                "models" if folder.startswith("models") else "export", folder, first_line(root, folder), place
+            )
+            for folder, place, _ in FLOW
+        ),
+        *(flow(*pair) for pair in pairwise(FLOW)),
+        *(
+            box("room", name, ROOMS[name].content, place, size_of(root, name))
+            for name, place in AROUND.items()
+        ),
+        *(
+            use(name, other)
+            for name, other in (
+                ("proofs", "fields"),
+                ("surfaces", "fields"),
+                ("pictures", "surfaces"),
+                ("pictures", "drawings"),
+                ("samples", "drawings"),
+                ("samples", "meshes"),
+            )
+        ),
         "</svg>",
     ]
     return "\n".join(parts) + "\n"
 
 
-def bars(root: Path) -> list[str]:
-    """The folders that use the whole flow, above it, and the ground below it."""
-    library = [folder for folder in ORDER if folder.startswith("export/library/")]
-    step = (WHOLE - 24 + 8) / len(library)
-    places = [(folder.rpartition("/")[2], LEFT + 12 + at * step) for at, folder in enumerate(library)]
-    return [
-        bar(root, "export/cli", 20, 50),
-        bar(root, "export/library", 82, 84),
-        *(chip(name, x, 130, step - 8) for name, x in places),
-        bar(root, "export/verify", 178, 50),
-        chip("programs", LEFT + WHOLE - 132, 191, 120),
-        bar(root, GROUND, 875, 50),
-        data_label("at its top errors and storage, which every folder uses", WIDTH - LEFT - 14, 905, "end"),
-    ]
+def size_of(root: Path, name: str) -> str:
+    """The lines of a room in words."""
+    return f"{lines_of(root, ROOMS[name]):,} lines"
 
 
-def bar(root: Path, folder: str, y: int, height: int) -> str:
-    """A folder over the whole width."""
-    words = f'<tspan class="what" dx="14">{escape(first_line(root, folder))}</tspan>'
-    text = f'<text x="{LEFT + 14}" y="{y + 30}"><tspan class="name">{folder}</tspan>{words}</text>'
-    return panel(folder, LEFT, y, WHOLE, height) + text
-
-
-def chip(text: str, x: float, y: float, width: float) -> str:
-    """The name of a folder inside another one."""
-    return (
-        f'<rect x="{x:.1f}" y="{y}" width="{width:.1f}" height="24" rx="12" fill="#ffffff" stroke="#4b8b50"/>'
-        f'<text class="what" text-anchor="middle" x="{x + width / 2:.1f}" y="{y + 16}">{text}</text>'
+def words(x: float, y: float, *spans: tuple[str, str]) -> str:
+    """A line of text, each part with its class."""
+    inner = "".join(
+        f'<tspan class="{kind}" dx="{8 * bool(at)}">{escape(text)}</tspan>'
+        for at, (text, kind) in enumerate(spans)
     )
+    return f'<text x="{x}" y="{y}">{inner}</text>'
 
 
-def panel(folder: str, x: float, y: float, width: float, height: float) -> str:
+def panel(ink: str, x: float, y: float, width: float, height: float) -> str:
     """A box in the colour of its part."""
-    fill, line = INK[folder.partition("/")[0]]
+    fill, line = INK[ink]
+    place = f'x="{x}" y="{y}" width="{width}" height="{height}"'
+    return f'<rect {place} rx="8" fill="{fill}" stroke="{line}" stroke-width="1.4"/>'
+
+
+def box(ink: str, name: str, content: str, place: tuple[int, int], size: str = "") -> str:
+    """A folder or a room with its description and, for a room, its lines and the rooms that it may use."""
+    x, y = COLUMNS[place[0]], ROWS[place[1]]
+    lines = [(line, "what") for line in wrap(content, 26)]
+    uses = ROOMS[name].uses if name in ROOMS else ()
+    lines += [(line, "data") for line in wrap(f"→ {', '.join(uses)}", 26) if uses]
+    text = [words(x + 12, y + 39 + 16 * at, line) for at, line in enumerate(lines)]
     return (
-        f'<rect x="{x}" y="{y}" width="{width}" height="{height}" rx="8" fill="{fill}" '
-        f'stroke="{line}" stroke-width="1.4"/>'
+        panel(ink, x, y, WIDE, HIGH) + words(x + 12, y + 22, (name, "name"), (size, "data")) + "".join(text)
     )
 
 
-def corner(folder: str) -> tuple[int, int]:
-    """Top left corner of a folder."""
-    column, y = PLACES[folder]
-    return LEFT + column * (WIDE + GAP), y
+def flow(begin: tuple[str, tuple[int, int], str], end: tuple[str, tuple[int, int], str]) -> str:
+    """The arrow of the data from one folder of the core to the next."""
+    return line("flow", begin[1], end[1], begin[2])
 
 
-def box(root: Path, folder: str) -> str:
-    """A folder with its name and description."""
-    x, y = corner(folder)
-    lines = [
-        f'<tspan x="{x + 12}" dy="17">{escape(line)}</tspan>' for line in wrap(first_line(root, folder), 25)
-    ]
-    name = f'<text class="name" x="{x + 12}" y="{y + 24}">{folder}</text>'
-    words = f'<text class="what" x="{x + 12}" y="{y + 27}">{"".join(lines)}</text>'
-    return panel(folder, x, y, WIDE, HIGH) + name + words
+def use(name: str, other: str) -> str:
+    """The arrow from a room to one beside it that it may use."""
+    return line("use", AROUND[name], AROUND[other])
 
 
-def arrow(begin: str, end: str, above: str, below: str) -> str:
-    """An arrow between two folders, with the names of the data."""
-    (x, y), (to_x, to_y) = corner(begin), corner(end)
-    middle, level = to_x + WIDE / 2, y + HIGH / 2
+def line(kind: str, begin: tuple[int, int], end: tuple[int, int], data: str = "") -> str:
+    """An arrow between two places in one row or column."""
+    (x, y), (to_x, to_y) = ((COLUMNS[column], ROWS[row]) for column, row in (begin, end))
     if y == to_y:
         start, stop = (x + WIDE, to_x - 3) if to_x > x else (x, to_x + WIDE + 3)
-        path, at = f"M{start} {level}H{stop}", (start + stop) / 2
-        words = data_label(above, at, level - 8) + (data_label(below, at, level + 18) if below else "")
-    elif x == to_x:
-        path = f"M{middle} {y + HIGH}V{to_y - 3}"
-        words = data_label(above, middle + 8, (y + HIGH + to_y - 3) / 2 + 4, "start")
-    elif to_y < y:  # up between two rows
-        leave, enter, lane = x + WIDE - 30, to_x + 30, y - 26
-        path = f"M{leave} {y}V{lane}H{enter}V{to_y + HIGH + 3}"
-        words = data_label(above, (leave + enter) / 2, lane - 6)
+        path, at = f"M{start} {y + HIGH / 2}H{stop}", ((start + stop) / 2, y + HIGH / 2 - 8)
     else:
-        path = f"M{x + WIDE} {level}H{middle}V{to_y - 3}"
-        words = data_label(above, (x + WIDE + middle) / 2, level - 8)
-    return f'<path class="flow" d="{path}"/>{words}'
-
-
-def data_label(text: str, x: float, y: float, anchor: str = "middle") -> str:
-    """The name of some data."""
-    return f'<text class="data" text-anchor="{anchor}" x="{x}" y="{y}">{escape(text)}</text>'
-
-
-def data_at_ends() -> list[str]:
-    """The data that enter at the first folder, and those that leave at the last one."""
-    middle, (x, _) = LEFT + WIDE / 2, corner("export/pictures")
-    sketch = data_label("a sketch: SVG, bitmap, .scap, .curves", LEFT, 270, "start")
-    answer = data_label("pictures, report", x - 58, 666, "end")
-    return [
-        f'{sketch}<path class="flow" d="M{middle} 280V317"/>',
-        f'<path class="flow" d="M{x} 662H{x - 50}"/>{answer}',
-    ]
+        start, stop = (y + HIGH, to_y - 3) if to_y > y else (y, to_y + HIGH + 3)
+        path, at = f"M{x + WIDE / 2} {start}V{stop}", (x + WIDE / 2 + 28, (start + stop) / 2 + 4)
+    label = f'<text class="data" text-anchor="middle" x="{at[0]}" y="{at[1]}">{data}</text>' if data else ""
+    return f'<path class="{kind}" d="{path}"/>{label}'

@@ -1,1 +1,4 @@
-"""Solving on this machine: `solve` for every solver of the table, whose modules are in export/programs."""
+"""Solving on this machine.
+
+`solve` runs every solver of the table on files that it writes; the modules of programs are in export/programs.
+"""

@@ -6,13 +6,14 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from crossfield.models.field.field import CrossField
+from crossfield.models.field.field import CrossField, field_in_windows
+from crossfield.models.field.jumps import step_labels
 from crossfield.models.formulations.catalogue import FORMULATIONS, list_formulations
 from crossfield.models.formulations.problem import Problem, formulate, with_integers_fixed
-from crossfield.models.instance.angles import QUARTER
+from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.domain import Floats
 from crossfield.models.instance.instance import Instance
-from crossfield.models.orthogonal.energy import OrthogonalEnergy, field_of, integers_of
+from crossfield.models.instance.least_squares import RightAngles
 from meshes import box, tetrahedron
 
 SKEWED = list_formulations()
@@ -127,11 +128,31 @@ def make_field(instance: Instance, seed: int = 2) -> CrossField:
     field = CrossField(instance, alpha, beta, rng.integers(instance.p_min, instance.p_max + 1))
     if not instance.orthogonal:
         return field
-    energy = OrthogonalEnergy.of(instance)
     best = field.with_best_jumps()
-    return (
-        best if instance.gauge == "box" else field_of(instance, energy.descend(integers_of(best))[0], energy)
-    )
+    return best if instance.gauge == "box" else _settle(best)
+
+
+def _settle(field: CrossField) -> CrossField:
+    """The field of orthogonal crosses after changes of single integers, until none lowers the energy."""
+    instance, terms = field.instance, RightAngles.of(field.instance)
+    roots = np.sqrt(terms.weight)
+    matrix = roots[:, None] * terms.matrix.toarray()
+
+    def fit(z: Floats) -> tuple[float, Floats]:
+        wanted = -roots * (terms.constant + HALF * z)
+        alpha = np.linalg.lstsq(matrix, wanted)[0]
+        return float(np.sum((matrix @ alpha - wanted) ** 2)), alpha
+
+    steps = np.vstack([np.eye(len(roots)), -np.eye(len(roots))])
+    z = np.append(field.p, np.zeros(len(instance.theta)))
+    best = z
+    while fit(best)[0] <= fit(z)[0] - 1e-9 or best is z:
+        z, best = best, min((best + step for step in steps), key=lambda each: fit(each)[0])
+    pairs, line = len(field.p), np.zeros(instance.domain.size, dtype=np.int32)
+    line[instance.stroke_index] = z[pairs:]
+    jumps = z[:pairs].astype(np.int32)
+    alpha, beta, p = step_labels(instance.domain, fit(z)[1], np.zeros(len(line)), jumps, line)
+    return field_in_windows(instance, alpha, beta, p)
 
 
 def make_problem(name: str, instance: Instance, **options: Any) -> Problem:
