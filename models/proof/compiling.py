@@ -10,16 +10,16 @@ import math
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
 
+import numpy as np
 from filelock import FileLock
 
 from ..errors import CrossfieldError, SolverError
+from ..instance.instance import Instance
 from ..processes.child import Child, KilledError
 from ..processes.child_program import WorkerError
 from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, Over, Progress, never, silent
-from ..samples.samples import sample
 from ..search.greedy import greedy_field
 from ..storage import temporary_folder
 from .bound import orthogonal_dual
@@ -76,7 +76,9 @@ def compile_all(orthogonal: bool) -> None:
     with FileLock(cache_folder() / "compiling.lock"), _without_collection():
         if _is_compiled(orthogonal):
             return
-        instance = replace(sample("mouse", 4).with_gauge("strokes"), orthogonal=orthogonal)
+        corners, theta = [[0, 0], [0, 2], [2, 0], [2, 2]], [0.1, 0.9, 0.8, 0.0]  # a proof that uses rings
+        mask, w = np.ones((3, 3), dtype=bool), np.ones(4)
+        instance = Instance.on_pixels("small", mask, corners, theta, w, orthogonal=orthogonal)
         if orthogonal:
             ends = Termination(Deadline(), never, gap=0.0, work=math.inf)
             prove_orthogonal(instance, None, ends, silent)
