@@ -45,7 +45,6 @@ from .passes import MINIMA, PASS, work_on
 from .pruning import (
     RemainingCells,
     allowed_rows,
-    bound_by_boxes,
     corners_of,
     interpolate_shares,
     surviving_cells,
@@ -254,13 +253,13 @@ class Dual:
         self.forward()
         excess = self._excess(bound, energy)
         cells = self._cells_of_pass(excess)
-        left = bound_by_boxes(self.lattice, cells)
+        left = RemainingCells(self.lattice, cells)
         single = single_excesses(self.state, self._crew) if combs else None
         for columns in (True, False):
             if single is not None and not left.is_empty:
                 state = self._state_at(corners_of(self.lattice, left.cells))
                 survives = comb_excesses(state, single, self._crew, columns=columns) <= excess
-                left = bound_by_boxes(self.lattice, left.cells & surviving_cells(self.lattice, survives))
+                left = RemainingCells(self.lattice, left.cells & surviving_cells(self.lattice, survives))
                 self._left_by_combs = int(left.cells.sum()) / int(cells.sum())
         return left
 

@@ -24,7 +24,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...instance.angles import QUARTER
 from ...instance.domain import Bools, Floats, Ints
 from ...processes.compilation import compiled, inlined
 from .lattice import Lattice, Starts, beta_range, block_starts, ranges
@@ -35,15 +34,10 @@ class RemainingCells:
     """The cells that are left on a lattice.
 
     cells: bool, flat like the labels: whether the cell from this label upwards is left.
-    alpha_low, alpha_high, beta_low, beta_high (n,): the box round a pixel's cells in radians, |beta| <= pi/4.
     """
 
     lattice: Lattice
     cells: Bools
-    alpha_low: Floats
-    alpha_high: Floats
-    beta_low: Floats
-    beta_high: Floats
 
     @property
     def is_empty(self) -> bool:
@@ -51,20 +45,11 @@ class RemainingCells:
         return bool((np.add.reduceat(self.cells, self.lattice.start[:-1], dtype=np.int64) == 0).any())
 
     @property
-    def bounds(self) -> tuple[Floats, Floats]:
-        """Least and greatest (alpha, beta) of the boxes, shapes (2n,)."""
-        low = np.concatenate([self.alpha_low, self.beta_low])
-        return low, np.concatenate([self.alpha_high, self.beta_high])
-
-
-def bound_by_boxes(lattice: Lattice, cells: Bools) -> RemainingCells:
-    """Cells that are left on a lattice, with the boxes round them."""
-    at = lattice.h * (_vertex_ranges(lattice, cells) + lattice.offset[:, None])
-    return RemainingCells(
-        lattice, cells,
-        lattice.alpha + at[:, 0], lattice.alpha + at[:, 1],
-        np.maximum(lattice.beta + at[:, 2], -QUARTER), np.minimum(lattice.beta + at[:, 3], QUARTER),
-    )  # fmt: skip
+    def boxes(self) -> Floats:
+        """The box round each pixel's cells: alpha from, to, beta from, to in radians; shape (n, 4)."""
+        lattice = self.lattice
+        centre = np.repeat(np.stack([lattice.alpha, lattice.beta], axis=1), 2, axis=1)
+        return centre + lattice.h * (_vertex_ranges(lattice, self.cells) + lattice.offset[:, None])
 
 
 def surviving_cells(lattice: Lattice, survives: Bools) -> Bools:

@@ -68,9 +68,9 @@ def energy_terms(instance: Instance, norm: Norm) -> EnergyTerms:
 
 def last_step_on(left: RemainingCells, terms: EnergyTerms, field: CrossField) -> LastStep:
     """The last step on the boxes round the cells that are left, with the jumps of a field."""
-    beta_low, beta_high = np.maximum(left.beta_low - _MARGIN, -QUARTER), left.beta_high + _MARGIN
-    sides = left.alpha_low - _MARGIN, left.alpha_high + _MARGIN, beta_low, np.minimum(beta_high, QUARTER)
-    return last_step(terms, np.stack(sides, axis=1), field.alpha, field.p.astype(np.int64))
+    boxes = left.boxes + np.array([-_MARGIN, _MARGIN, -_MARGIN, _MARGIN])
+    boxes[:, 2:] = np.clip(boxes[:, 2:], -QUARTER, QUARTER)
+    return last_step(terms, boxes, field.alpha, field.p.astype(np.int64))
 
 
 def has_few_open(terms: EnergyTerms, step: LastStep) -> bool:
