@@ -66,9 +66,9 @@ if TYPE_CHECKING:
     from .models.instance.mesh import Mesh as Mesh
     from .models.mesh.read import read_mesh as read_mesh
     from .models.processes.limits import Limits as Limits
-    from .models.proof.certificate import Certificate as Certificate
     from .models.proof.certificate import read_certificate as read_certificate
     from .models.proof.certificate import write_certificate as write_certificate
+    from .models.proof.descent.record import Claim as Claim
     from .models.proof.descent.record import Proof as Proof
     from .models.proof.prove import prove as prove
     from .models.samples.samples import sample as sample
@@ -88,7 +88,7 @@ if TYPE_CHECKING:
     from .models.surface.surface import Surface as Surface
 
 _HOME: Final = {
-    "Certificate": ".models.proof.certificate",
+    "Claim": ".models.proof.descent.record",
     "CrossField": ".models.field.field",
     "CrossfieldError": ".models.errors",
     "DomainError": ".models.errors",

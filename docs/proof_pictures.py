@@ -11,8 +11,8 @@ from crossfield.export.pictures.marks import STROKE
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.domain import Bools, Floats
 from crossfield.models.instance.grid import Grid
-from crossfield.models.proof.bound.lattice import block_starts
-from crossfield.models.proof.descent.record import LevelRecord, Proof
+from crossfield.models.proof.checkers import check_certificate
+from crossfield.models.proof.descent.record import Proof
 from diagrams import STYLE
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
@@ -25,23 +25,13 @@ WIDE: Final = 4.9
 """Inches, for words that are legible on a phone."""
 
 
-def allowed_cells(level: LevelRecord, pixel: int) -> Bools:
-    """The cells of a pixel with four allowed vertices, (alpha, beta)."""
-    begin = block_starts(level.alpha_count.astype(np.int64) * level.beta_count)
-    shape = (level.alpha_count[pixel], level.beta_count[pixel])
-    vertices: Bools = level.allowed[begin[pixel] : begin[pixel + 1]].reshape(shape)
-    return vertices[:-1, :-1] & vertices[1:, :-1] & vertices[:-1, 1:] & vertices[1:, 1:]
+def remaining_shares(allowed: list[Bools], h: float) -> Floats:
+    """The part of the strip that may hold a better cross of each pixel, shape (n,).
 
-
-def remaining_shares(level: LevelRecord) -> Floats:
-    """The part of the strip that may hold a better cross of each pixel, shape (n,)."""
-    counts = [allowed_cells(level, pixel).sum() for pixel in range(len(level.alpha))]
-    return np.minimum(np.array(counts) * level.h**2 / STRIP, 1.0)
-
-
-def last_levels(proof: Proof) -> list[LevelRecord]:
-    """The last level of each spacing."""
-    return list({level.h: level for level in proof.levels}.values())
+    allowed: the labels of each pixel. A cell is left if its four vertices are.
+    """
+    counts = [check_certificate.combine_corners(np.logical_and, labels).sum() for labels in allowed]
+    return np.minimum(np.array(counts) * h**2 / STRIP, 1.0)
 
 
 def box_shares(boxes: Floats) -> Floats:
@@ -51,8 +41,13 @@ def box_shares(boxes: Floats) -> Floats:
 
 def draw_maps(proof: Proof, boxes: Floats, path: Path) -> None:
     """Draw the part left at every pixel for every level, and after the last; one colour scale."""
-    levels = last_levels(proof)
-    values = [*map(remaining_shares, levels), box_shares(boxes)]
+    arrays = proof.certificate()
+    terms, _, _ = check_certificate.terms_with_strokes(arrays, *check_certificate.terms_of(arrays))
+    last = {level.h: number for number, level in enumerate(proof.levels)}.values()
+    levels = [proof.levels[number] for number in last]
+    allowed = [check_certificate.level_of(arrays, number, terms).allowed for number in last]
+    left = [remaining_shares(of_level, level.h) for of_level, level in zip(allowed, levels, strict=True)]
+    values = [*left, box_shares(boxes)]
     gaps = [1 - level.bound / proof.energy for level in levels]
     titles = [
         f"{np.degrees(level.h):.2g}° apart\ngap {100 * gap:.2g} %"

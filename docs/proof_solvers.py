@@ -17,7 +17,8 @@ from crossfield.models.errors import InstanceError
 from crossfield.models.field.field import Norm
 from crossfield.models.formulations.problem import Problem, with_windows
 from crossfield.models.instance.instance import Instance
-from crossfield.models.proof.certificate import Certificate, write_certificate
+from crossfield.models.proof.certificate import write_certificate
+from crossfield.models.proof.descent.record import Claim
 from crossfield.models.proof.prove import prove
 from crossfield.models.proof.tightening import remaining_windows
 from drawings import Sketch
@@ -84,7 +85,7 @@ USES: Final = (
 """Formulations for each solver."""
 
 
-def certificate_of(instance: Instance, seconds: float) -> Certificate:
+def certificate_of(instance: Instance, seconds: float) -> Claim:
     """The certificate of an instance."""
     with tempfile.TemporaryDirectory() as folder:
         return write_certificate(
@@ -100,7 +101,7 @@ def prove_here(instance: Instance, norm: Norm, seconds: float) -> Answer:
 
 def solver_rows(name: str, size: int, seconds: float, proof_seconds: float) -> Iterator[dict[str, Any]]:
     """Proofs of each installed solver for a sample: from the files as they are, and tightened."""
-    proofs: dict[str, Certificate] = {}
+    proofs: dict[str, Claim] = {}
     for solver, formulation in USES:
         if PROGRAMS[solver].missing:
             continue

@@ -18,9 +18,7 @@ from .sketch_options import Size, SketchOptions
 if TYPE_CHECKING:
     from ...models.field.field import Norm as NormOfField
     from ...models.instance.instance import Instance
-    from ...models.proof.certificate import Certificate
-    from ...models.proof.descent.orthogonal_certificate import LevelFacts, OrthogonalProof
-    from ...models.proof.descent.record import LevelRecord, Proof
+    from ...models.proof.descent.record import Claim, Proof
     from ...models.storage import NewResults
 
 NORMS: Final[dict[str, NormOfField]] = {"1": 1, "2": 2, "mixed": "mixed"}
@@ -106,7 +104,7 @@ class ProofNames(NamedTuple):
 
 
 def _write_proof(
-    proof: Proof | OrthogonalProof, folder: Path, names: ProofNames
+    proof: Proof, folder: Path, names: ProofNames
 ) -> tuple[dict[str, Any], CrossfieldError | None]:
     """Write field, certificate and report of a proof; return the report, and why there is no certificate."""
     from ...models.field.file import write_field
@@ -119,14 +117,13 @@ def _write_proof(
     except CrossfieldError as error:
         failure = error
     proven, bounds = _proven_facts(proof, certificate)
-    levels: tuple[LevelFacts | LevelRecord, ...] = proof.levels
     document = proven | {
         "reason": None if failure is None else str(failure),
         "seconds": proof.seconds,
         "ended": proof.ended,
         "levels": [
             {"spacing": level.h, "labels": level.size, "bound": bound}
-            for level, bound in zip(levels, bounds, strict=False)  # fewer are checked after Ctrl-C
+            for level, bound in zip(proof.levels, bounds, strict=False)  # fewer are checked after Ctrl-C
         ],
     }
     _write_report(document, folder / names.report)
@@ -137,9 +134,7 @@ def _write_report(document: dict[str, Any], path: Path) -> None:
     path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
 
 
-def _keep_better(
-    new: NewResults, proof: Proof | OrthogonalProof, names: ProofNames, document: dict[str, Any]
-) -> None:
+def _keep_better(new: NewResults, proof: Proof, names: ProofNames, document: dict[str, Any]) -> None:
     """Keep an earlier field of less energy and an earlier certificate of a higher bound.
 
     The report then has the energy of the one, and levels and bound of the other.
@@ -171,16 +166,14 @@ def _keep_better(
         _write_report(document, new.path / names.report)
 
 
-def _proven_facts(
-    proof: Proof | OrthogonalProof, certificate: Certificate | None
-) -> tuple[dict[str, Any], list[float]]:
+def _proven_facts(proof: Proof, certificate: Claim | None) -> tuple[dict[str, Any], list[float]]:
     """Facts that are proven, and the bound of each level, as the checker confirms them."""
-    if certificate is not None:
+    if certificate is not None and certificate.proven is not None:
         return proof_facts(certificate), certificate.proven.levels
     return proof_facts(proof) | {"status": UNPROVEN, "bound": 0.0, "gap": 1.0, "forced_jumps": 0}, []
 
 
-def proof_facts(source: Proof | OrthogonalProof | Certificate) -> dict[str, Any]:
+def proof_facts(source: Claim) -> dict[str, Any]:
     """Facts of a proof or a certificate, by name."""
     return {
         "instance": source.field.instance.name,
@@ -195,7 +188,7 @@ def proof_facts(source: Proof | OrthogonalProof | Certificate) -> dict[str, Any]
     }
 
 
-def _show_proof(proof: Proof | OrthogonalProof, document: dict[str, Any], folder: Path) -> None:
+def _show_proof(proof: Proof, document: dict[str, Any], folder: Path) -> None:
     """Print the report without its levels, and the folder of the files."""
     shown = {key: value for key, value in document.items() if key != "levels"}
     show_facts(proof.field.instance.summary, shown)

@@ -27,7 +27,6 @@ from ..solvers_table import SOLVERS
 from ..solving.local import names_of_solve, solve
 
 if TYPE_CHECKING:
-    from ...models.proof.descent.orthogonal_certificate import OrthogonalProof
     from ...models.proof.descent.record import Proof
 
 _STARTING: Final = 0.5  # share of the seconds for the field from which solvers start
@@ -48,7 +47,7 @@ class Candidate:
     solution: Solution | None = None
     interrupted: bool = False
     counts: tuple[tuple[str, int], ...] = ()
-    proof: Proof | OrthogonalProof | None = None
+    proof: Proof | None = None
 
     def facts(self) -> dict[str, Any]:
         """Facts for a report: the facts of the field, seconds, and claims with recomputed values."""

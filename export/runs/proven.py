@@ -8,11 +8,10 @@ from typing import TYPE_CHECKING, Any, Final
 
 from ...models.errors import SolverError
 from ...models.proof.checkers.check_certificate import gap_of, status_of
-from ...models.proof.descent.orthogonal_certificate import OrthogonalProof
 from ...models.proof.descent.record import Proof
 
 if TYPE_CHECKING:
-    from ...models.proof.certificate import Certificate
+    from ...models.proof.descent.record import Claim
 
 _ENDED: Final = {
     "time": "the time limit ended before a bound was proven; increase it",
@@ -33,7 +32,7 @@ class ProvenBound:
     certificate: Path
 
     @classmethod
-    def write(cls, proof: Proof | OrthogonalProof, path: Path) -> ProvenBound:
+    def write(cls, proof: Proof, path: Path) -> ProvenBound:
         """Return the result of a proof, with its certificate at `path`. Errors are those of `certify`."""
         return cls(certify(proof, path).bound, path)
 
@@ -53,7 +52,7 @@ class ProvenBound:
         return {"status": status, **facts, "certificate": self.certificate.name}
 
 
-def certify(proof: Proof | OrthogonalProof, path: Path) -> Certificate:
+def certify(proof: Proof, path: Path) -> Claim:
     """Write the certificate of a proof to `path`.
 
     Raises SolverError, with the reason, for a proof without a bound, InputError for a proof that the checker

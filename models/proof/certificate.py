@@ -6,73 +6,38 @@ docs/files.md, "Layout of a certificate", describes the arrays. Equal proofs giv
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, Final
 
 import numpy as np
 
 from ..array_archive import Arrays, pack_arrays
 from ..errors import CrossfieldError, InputError, InstanceError, OutputError, SolverError, naming
 from ..field.field import CrossField, Norm
+from ..instance.domain import Floats
 from ..instance.file import instance_arrays, instance_of_arrays
 from ..instance.instance import Instance
 from ..processes.deadline import Progress, silent
 from ..processes.job_counts import check_jobs
 from ..processes.process_groups import are_interrupts_caught
 from ..processes.process_pool import process_pool
+from ..search.stroked_parts import stroked_parts
 from ..storage import read_bytes, require_suffix, write_bytes
 from ..written_files import FORCE, check_targets, is_unchanged
 from .checkers import check_certificate, check_orthogonal
-from .checkers.check_certificate import ProvenClaim
-from .descent.orthogonal_certificate import OrthogonalProof
-from .descent.record import Claim, LevelRecord, Proof
+from .descent.record import INSTANCE, Claim, Proof
 
 REFUSALS: Final = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 """Errors of the checker for a proof that does not hold."""
 
-_PREFIX: Final = "instance_"
 _FEW, _MANY = 400_000, 30_000_000
 """Labels of a proof whose check takes longer than to start processes, and 3 GB of memory."""
 
 
-@dataclass(frozen=True, eq=False)
-class Certificate(Claim):
-    """A checked claim: no field has an energy below the bound.
-
-    Parameters
-    ----------
-    field
-        The field. With status `optimal`, its energy is the minimum.
-    energy
-        Its energy in the norm.
-    bound
-        Proven lower bound of the energy of all fields.
-    proven
-        Findings of the checker.
-
-    """
-
-    proven: ProvenClaim
-
-    @property
-    def norm(self) -> Norm:
-        """The norm of the energy."""
-        norm: Norm = self.proven.norm
-        return norm
-
-    @property
-    def forced(self) -> int:
-        """The number of pairs whose jump equals the field's in every field that could be better."""
-        return self.proven.forced
-
-
-def write_certificate(
-    proof: Proof | OrthogonalProof, path: str | Path, *, force: bool = False
-) -> Certificate:
+def write_certificate(proof: Proof, path: str | Path, *, force: bool = False) -> Claim:
     """Write the certificate of a proof, as far as the checker confirms it.
 
     The certificate may claim less than the proof. The same proof gives the same bytes.
@@ -89,7 +54,7 @@ def write_certificate(
 
     Returns
     -------
-    Certificate
+    Claim
         What the file claims.
 
     Raises
@@ -108,34 +73,21 @@ def write_certificate(
     if not proof.levels:
         reason = proof.reason or "no level was completed"
         raise SolverError(f"is not written: nothing was proven, because {reason}", file=path)
-    if isinstance(proof, OrthogonalProof):
-        if proof.proven is None:
-            raise InputError("would hold a proof that is not valid; prove it again", file=path)
-        certificate = Certificate(proof.field, proof.energy, proof.bound, proof.proven)
-        return _write_arrays(certificate, proof.certificate(), path, force=force)
     try:
         checked = proof if proof.proven is not None else check_proof(proof)
     except REFUSALS as error:
         raise InputError(f"would hold a proof that is not valid: {error}", file=path) from error
     except MemoryError as error:
         raise SolverError("is not written: its check takes more memory than there is", file=path) from error
-    proven = cast("ProvenClaim", checked.proven)
-    arrays = _head_arrays(checked) | _proof_arrays(checked) | cast("Arrays", checked.pieces)
-    certificate = Certificate(checked.field, checked.energy, checked.bound, proven)
-    return _write_arrays(certificate, arrays, path, force=force)
-
-
-def _write_arrays(certificate: Certificate, arrays: Arrays, path: Path, *, force: bool) -> Certificate:
-    """Write the arrays of a certificate, unless an earlier one has a higher bound; return it."""
-    earlier = None if force else earlier_bound(path, certificate.field.instance, certificate.norm)
-    if earlier is not None and earlier > certificate.bound:
+    earlier = None if force else earlier_bound(path, checked.field.instance, checked.norm)
+    if earlier is not None and earlier > checked.bound:
         raise OutputError(
-            f"has a proof of a higher bound ({earlier:.6g}, now {certificate.bound:.6g}); choose another "
+            f"has a proof of a higher bound ({earlier:.6g}, now {checked.bound:.6g}); choose another "
             f"name, or replace it with {FORCE}",
             file=path,
         )
-    write_bytes(path, pack_arrays(arrays), force=force)
-    return certificate
+    write_bytes(path, pack_arrays(checked.certificate()), force=force)
+    return checked
 
 
 def earlier_bound(path: Path, on: Instance, norm: Norm = 2) -> float | None:
@@ -155,21 +107,25 @@ def earlier_bound(path: Path, on: Instance, norm: Norm = 2) -> float | None:
     return float(head["bound"]) if is_same else None
 
 
-def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Proof:
+def check_proof(
+    proof: Proof, jobs: int = 1, progress: Progress = silent, limit: Floats | None = None
+) -> Proof:
     """The proof with the checker's findings, and with the bound and the forced jumps that it confirms.
 
     After Ctrl-C, the proof has only the levels that are checked. KeyboardInterrupt is raised without any, and
     in a block that catches Ctrl-C itself. Last levels whose check takes more memory than a reader grants are
     left out.
 
-    jobs: as of `read_certificate`. Raises one of `REFUSALS` for a proof that does not hold, and WorkerError
-    when a process dies.
+    jobs: as of `read_certificate`. limit: of Lemma 1 of orthogonal crosses, where it is known. Raises one of
+    `REFUSALS` for a proof that does not hold, and WorkerError when a process dies.
     """
+    if proof.field.instance.orthogonal:
+        return _confirm(proof, _check_orthogonal(proof, limit))
     while not _takes_memory_of_file(proof) and len(proof.levels) > 1:
-        proof = replace(proof, levels=proof.levels[:-1], bound=0.0, forced=0, ended="labels", pieces=None)
-    arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
-    closed = proof.status == "optimal" or proof.forced == len(proof.levels[0].p)
-    has_pieces = proof.pieces is not None or closed
+        proof = proof.with_levels(len(proof.levels) - 1, "labels")
+    arrays, part = replace(proof, bound=0.0).certificate(), stroked_parts(proof.field.instance)
+    closed = proof.status == "optimal" or proof.forced == len(part.grid.first)
+    has_pieces = "cuts" in arrays or closed
     with _pass_function(arrays, jobs, silent) as pass_all:
 
         def pass_until_interrupted(work: Any, tasks: list[Any]) -> list[Any]:
@@ -185,21 +141,30 @@ def check_proof(proof: Proof, jobs: int = 1, progress: Progress = silent) -> Pro
 
         passed = check_certificate.pass_levels(arrays, pass_until_interrupted, has_pieces=has_pieces)
     if len(passed.bounds) < len(proof.levels):
-        proof = replace(proof, levels=proof.levels[: len(passed.bounds)], ended="interrupted", pieces=None)
-        arrays = _head_arrays(replace(proof, bound=0.0)) | _proof_arrays(proof)
+        proof = proof.with_levels(len(passed.bounds), "interrupted")
         pieces = _whole_piece(passed)
     else:
-        pieces = _last_step_arrays(proof, passed, has_pieces=has_pieces)
-    proven = check_certificate.check_last_step(arrays | pieces, passed)
+        pieces = _last_step_arrays(proof, part, passed, has_pieces=has_pieces)
+    proof = replace(proof, bound=0.0, arrays=proof.arrays | pieces)
+    return _confirm(proof, check_certificate.check_last_step(proof.certificate(), passed))
+
+
+def _check_orthogonal(proof: Proof, limit: Floats | None) -> check_certificate.Verdict:
+    arrays = replace(proof, bound=0.0).certificate()
+    memory = check_certificate.memory_for(len(pack_arrays(arrays)), check_orthogonal.MORE_ROOM)
+    verdict: check_certificate.Verdict = check_orthogonal.check_arrays(arrays, limit, memory)
+    return verdict
+
+
+def _confirm(proof: Proof, proven: check_certificate.Verdict) -> Proof:
+    """The proof with what the checker confirms."""
     ended = "optimal" if proven.status == "optimal" else proof.ended
-    checked = replace(proof, bound=proven.bound, forced=proven.forced, ended=ended, pieces=pieces)
-    object.__setattr__(checked, "proven", proven)
-    return checked
+    return proof.confirmed(proven, bound=proven.bound, ended=ended)
 
 
 def _takes_memory_of_file(proof: Proof) -> bool:
     """Whether the check of a proof takes at most the memory that its certificate may take."""
-    arrays = _head_arrays(proof) | _proof_arrays(proof)
+    arrays = proof.certificate()
     for pack in (False, True):  # packing takes long, and a small level fits without
         with suppress(check_certificate.UnreadableError):
             check_certificate.check_memory(arrays, len(pack_arrays(arrays)) if pack else 0)
@@ -224,54 +189,18 @@ def _pass_function(arrays: Arrays, jobs: int, progress: Progress) -> Iterator[Ca
         yield pass_all
 
 
-def _head_arrays(proof: Proof) -> Arrays:
-    """The head of a certificate, with the claim of a proof."""
-    head = {
-        "format": check_certificate.FORMAT,
-        "version": check_certificate.VERSION,
-        "status": proof.status,
-        "energy": proof.energy,
-        "bound": proof.bound,
-        "levels": len(proof.levels),
-        "norm": proof.norm,
-    }
-    return {"head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)}
-
-
-def _proof_arrays(proof: Proof) -> Arrays:
-    """The arrays of a proof's certificate without its head and the pieces of the last steps."""
-    field, first = proof.field, proof.levels[0]
-    arrays = {_PREFIX + name: array for name, array in instance_arrays(field.instance).items()}
-    arrays |= {"alpha": field.alpha, "beta": field.beta, "p": field.p}
-    arrays |= {"centre_alpha": first.alpha, "centre_beta": first.beta}
-    if proof.norm != 2:
-        slopes = np.zeros(first.instance.grid.size)
-        slopes[first.instance.stroke_index] = first.slopes
-        arrays["slopes"] = slopes
-    for number, level in enumerate(proof.levels):
-        arrays |= {f"level_{number}_{name}": array for name, array in _level_arrays(level).items()}
-    return arrays
-
-
-def _level_arrays(level: LevelRecord) -> Arrays:
-    ranges = (level.alpha_first, level.alpha_count, level.beta_first, level.beta_count)
-    return {
-        "h": np.array([level.h]),
-        "ranges": np.stack(ranges, axis=1).astype(np.int32),
-        "allowed": np.packbits(level.allowed),
-        **level.shares,
-        **level.tables,
-    }
-
-
 def _whole_piece(passed: check_certificate.PassedLevels) -> Arrays:
     """A last step that proves nothing: because there is one, the checker gives the last level its combs."""
     size = 2 * (len(passed.terms.first) + len(passed.terms.white))
     return {"cuts": np.array([-1], np.int32), "multipliers": np.zeros((1, size))}
 
 
-def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels, *, has_pieces: bool) -> Arrays:
+def _last_step_arrays(
+    proof: Proof, part: Instance, passed: check_certificate.PassedLevels, *, has_pieces: bool
+) -> Arrays:
     """The cuts and the multipliers of the last step; none unless it has pieces.
+
+    part: the instance on the parts of its mask that have a stroke.
 
     The prover's boxes are a little larger than the checker's, so its pieces cover these as a rule.
     """
@@ -280,16 +209,15 @@ def _last_step_arrays(proof: Proof, passed: check_certificate.PassedLevels, *, h
     terms, last, size = passed.terms, passed.last, 2 * (len(passed.terms.first) + len(passed.terms.white))
     if last is None or not has_pieces:
         return {"cuts": np.zeros(0, np.int32), "multipliers": np.zeros((0, size))}
-    instance = proof.levels[0].instance
-    if proof.pieces is not None:
+    if "cuts" in proof.arrays:
         with suppress(check_certificate.NotProvenError):
-            return fit_to_boxes(instance, terms, last, proof.pieces, proof.bound)
-    return minimise_on_boxes(instance, terms, last, proof.energy).pieces
+            return fit_to_boxes(part, terms, last, proof.arrays, proof.bound)
+    return minimise_on_boxes(part, terms, last, proof.energy).pieces
 
 
 def read_certificate(
     path: str | Path, *, on: Instance | None = None, jobs: int = 1, progress: Progress = silent
-) -> Certificate:
+) -> Claim:
     """Read and check a certificate.
 
     Field, instance, energy, bound and status come from the arrays that the checker has checked.
@@ -308,7 +236,7 @@ def read_certificate(
 
     Returns
     -------
-    Certificate
+    Claim
         The claim, which holds.
 
     Raises
@@ -340,18 +268,19 @@ def read_certificate(
         raise InputError(f"is not a certificate: {error}", file=path) from error
     except MemoryError as error:
         raise InputError("takes more memory to check than there is", file=path) from error
-    return Certificate(field, field.energy(proven.norm).total, bound, proven)
+    energy = field.energy(proven.norm).total
+    return Claim(field, energy, bound, proven.forced, proven.norm).confirmed(proven)
 
 
 def _check_any(
     data: bytes, path: Path, jobs: int, progress: Progress
-) -> tuple[CrossField, float, ProvenClaim]:
+) -> tuple[CrossField, float, check_certificate.Verdict]:
     """Field, claimed bound and findings of the checker, for either kind of crosses."""
     arrays = check_certificate.unpack_archive(data)
     head = check_certificate.refuse_damage(check_certificate.json_of)(arrays, "head")
     if head.get("format") == check_orthogonal.FORMAT:
         memory = check_certificate.memory_for(len(data), check_orthogonal.MORE_ROOM)
-        proven: ProvenClaim = check_orthogonal.check_arrays(arrays, memory=memory)
+        proven: check_certificate.Verdict = check_orthogonal.check_arrays(arrays, memory=memory)
     else:
         check_certificate.check_sizes(arrays, len(data))
         with _pass_function(arrays, jobs, progress) as pass_all:
@@ -362,12 +291,12 @@ def _check_any(
 
 def _field_of(arrays: Arrays) -> CrossField:
     """The field of a certificate; its instance must not round the arrays, which alone are proven."""
-    parts = {name: array for name, array in arrays.items() if name.startswith(_PREFIX)}
-    instance = instance_of_arrays({name.removeprefix(_PREFIX): array for name, array in parts.items()})
+    parts = {name: array for name, array in arrays.items() if name.startswith(INSTANCE)}
+    instance = instance_of_arrays({name.removeprefix(INSTANCE): array for name, array in parts.items()})
     field = CrossField(
         instance, arrays["alpha"], arrays.get("beta", np.zeros(instance.domain.size)), arrays["p"]
     )
-    written = {_PREFIX + name: array for name, array in instance_arrays(instance).items()}
+    written = {INSTANCE + name: array for name, array in instance_arrays(instance).items()}
     if instance.domain.kappa is not None:
         parts["kappa"], written["kappa"] = arrays["kappa"], instance.domain.kappa
     for name, array in parts.items():

@@ -6,7 +6,6 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeVar
 
 from ..arguments import check_count
 from ..errors import InputError
@@ -25,11 +24,7 @@ from .compiling import compile_proofs
 from .descent.absolute_descent import AbsoluteDescent
 from .descent.descent import Descent, Termination
 from .descent.orthogonal import prove_orthogonal
-from .descent.orthogonal_certificate import OrthogonalProof
-from .descent.orthogonal_certificate import check_proof as check_orthogonal_proof
 from .descent.record import Proof
-
-_AnyProof = TypeVar("_AnyProof", Proof, OrthogonalProof)
 
 
 @one_thread()
@@ -44,7 +39,7 @@ def prove(
     jobs: int = 2,
     progress: Progress = silent,
     stop: Stop | None = None,
-) -> Proof | OrthogonalProof:
+) -> Proof:
     """Find a field of low energy, and prove a lower bound of the energy of all fields.
 
     The proof of an instance in the gauge `box`, with its field, is that of the same sketch in the gauge
@@ -86,7 +81,7 @@ def prove(
 
     Returns
     -------
-    Proof or OrthogonalProof
+    Proof
         The field, its energy, the bound, and the levels that prove it.
 
     Raises
@@ -127,7 +122,7 @@ def prove(
         ends = Termination(Deadline.after(seconds, end.clock), over, chosen.gap, work or math.inf)
         if instance.orthogonal:
             proven, limit = prove_orthogonal(instance, start, ends, progress, seed)
-            return _checked_proof(proven, lambda: check_orthogonal_proof(proven, limit), progress)
+            return _checked_proof(proven, lambda: check_proof(proven, limit=limit), progress)
         part = stroked_parts(instance)
         start = None if start is None else restricted(start, part)
         kind = Descent if norm == 2 else AbsoluteDescent
@@ -140,7 +135,7 @@ def prove(
     return _checked_proof(proof, lambda: check_proof(proof, chosen.threads or jobs, progress), progress)
 
 
-def _checked_proof(proof: _AnyProof, check: Callable[[], _AnyProof], progress: Progress) -> _AnyProof:
+def _checked_proof(proof: Proof, check: Callable[[], Proof], progress: Progress) -> Proof:
     """The part of a proof that a check confirms: no level, with the reason, where it fails."""
     if not proof.levels:
         return proof

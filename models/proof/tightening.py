@@ -9,13 +9,12 @@ from ..formulations.windows import Windows
 from ..instance.angles import HALF, QUARTER
 from ..instance.domain import Bools
 from ..instance.terms import parity_sign
-from .certificate import Certificate
-from .checkers.check_certificate import ProvenBoxes
+from .descent.record import Claim
 
 _MARGIN = 1e-9  # radians by which windows are wider than the boxes, to allow for rounding in solvers
 
 
-def remaining_windows(certificate: Certificate) -> Windows:
+def remaining_windows(certificate: Claim) -> Windows:
     """Windows of the angles, and ranges of the jumps, of every field of at most the certificate's energy.
 
     Each box of the certificate is moved to the label that its field has in the gauge. If it exceeds the
@@ -25,7 +24,7 @@ def remaining_windows(certificate: Certificate) -> Windows:
     certificate of orthogonal crosses.
     """
     field, proven = certificate.field, certificate.proven
-    if not isinstance(proven, ProvenBoxes):
+    if proven is None or proven.boxes is None:
         raise InputError("certificates of orthogonal crosses hold no windows; export without one")
     instance, grid = field.instance, field.instance.grid
     steps = np.round((field.alpha - proven.boxes[:, :2].mean(axis=1)) / HALF).astype(np.int32)

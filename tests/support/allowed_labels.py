@@ -3,6 +3,12 @@
 import numpy as np
 
 
+def allowed_of(arrays, level):
+    """The bits of a level's labels."""
+    count = arrays[f"level_{level}_ranges"][:, 1::2].astype(int).prod(axis=1).sum()
+    return np.unpackbits(arrays[f"level_{level}_allowed"], count=count).astype(bool)
+
+
 def with_allowed(arrays, level, bits):
     """The arrays with other bits of a level's labels: shares stay as they were, and are 0 at new labels."""
     at = f"level_{level}_"

@@ -10,10 +10,10 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.mesh import Mesh
 from crossfield.models.orthogonal.energy import OrthogonalEnergy
 from crossfield.models.processes.deadline import Deadline, never, silent
+from crossfield.models.proof.certificate import check_proof
 from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.descent.descent import Termination
 from crossfield.models.proof.descent.orthogonal import _Prover
-from crossfield.models.proof.descent.orthogonal_certificate import check_proof
 from scipy.spatial import Delaunay
 
 

@@ -17,7 +17,6 @@ from ....models.formulations.problem import Problem, formulate, with_integers_fi
 from ....models.instance.angles import HALF
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import write_certificate
-from ....models.proof.descent.record import Proof
 from ....models.search.greedy import greedy_field
 from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.reproducible_angles import reproducible_field
@@ -137,7 +136,7 @@ def _prove(start: CrossField, file: str, norm: Norm = 2) -> tuple[KnownField, Ch
 
     proof = prove(start.instance, norm=norm, start=start, work=_MOST_WORK, jobs=1)
     field = reproducible_field(proof.field) if norm == 2 else proof.field
-    if isinstance(proof, Proof):  # the bytes of other proofs hold their field
+    if not field.instance.orthogonal:  # their levels are pruned for the energy of the field
         proof = replace(proof, field=field, energy=field.energy(norm).total)
     with temporary_folder() as folder:
         path = folder / "a.certificate.npz"

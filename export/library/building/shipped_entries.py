@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from ....models.field.field import CrossField
     from ....models.formulations.problem import Problem
     from ....models.instance.instance import Instance
-    from ....models.proof.certificate import Certificate
+    from ....models.proof.descent.record import Claim
     from ...formats.registry import Written
     from ..ledger.known_points import InstancePoints
     from ..ledger.ledger import Ledger
@@ -106,7 +106,7 @@ class LibraryEntry:
         return best_point(self.problem, known, certified).known.field
 
     @cached_property
-    def certificate(self) -> Certificate | None:
+    def certificate(self) -> Claim | None:
         """The checked certificate of the instance in the norm that the entry minimises; None without one.
 
         Raises InputError for a certificate that is refused.

@@ -18,7 +18,8 @@ from ....models.errors import CrossfieldError, InputError
 from ....models.formulations.problem import Problem, with_windows
 from ....models.formulations.windows import Windows
 from ....models.instance.instance import Instance
-from ....models.proof.certificate import Certificate, read_certificate
+from ....models.proof.certificate import read_certificate
+from ....models.proof.descent.record import Claim
 from ....models.proof.tightening import remaining_windows
 from ....models.storage import read_bytes
 from ...bundle.manifest import ENTRY_FORMAT, described_problem
@@ -129,7 +130,7 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
     return described_problem(document, folder / f"{document['name']}.json", windows_of)
 
 
-def tightened_by(certificate: Certificate, problem: Problem) -> Problem:
+def tightened_by(certificate: Claim, problem: Problem) -> Problem:
     """Return a problem in the windows that a certificate leaves."""
     return with_windows(problem, remaining_windows(certificate))
 

@@ -17,7 +17,8 @@ from ....models.formulations.problem import Problem
 from ....models.instance.angles import QUARTER
 from ....models.instance.domain import Floats
 from ....models.instance.instance import Instance
-from ....models.proof.certificate import Certificate, read_certificate
+from ....models.proof.certificate import read_certificate
+from ....models.proof.descent.record import Claim
 from ....models.storage import temporary_folder
 from ...formats.registry import program_version
 from .grades import ACCEPTED_VIOLATION
@@ -66,9 +67,7 @@ class CheckedCertificate:
     facts: dict[str, Any]
 
     @classmethod
-    def of(
-        cls, certificate: Certificate, file: str, data: bytes, provenance: Provenance
-    ) -> CheckedCertificate:
+    def of(cls, certificate: Claim, file: str, data: bytes, provenance: Provenance) -> CheckedCertificate:
         """Return it as the checker found it."""
         facts = {key: getattr(certificate, key) for key in ("status", "energy", "bound")}
         return cls(certificate.norm, KnownField(certificate.field, provenance), file, data, facts)

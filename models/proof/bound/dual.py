@@ -218,7 +218,11 @@ class Dual:
         return max(map(_greatest_size, self._values)), _greatest_size(unary[np.isfinite(unary)])
 
     def bound(self) -> float:
-        """The bound that any shares prove, as `LevelRecord` defines it."""
+        """The bound that any shares prove, minus a bound of its rounding error.
+
+        It is the sum over pixels of min (D + shares), over pairs of min (c + tables - shares), and over
+        clusters of min (- tables), each over the allowed labels.
+        """
         pairs, numbers = np.zeros(len(self.lattice.p)), np.arange(len(self.lattice.p))
         self._crew.run(
             lambda part: work_on(MINIMA, numbers[part], 0, self.state, pairs, pairs),
@@ -283,11 +287,17 @@ class Dual:
         """The excess over a bound up to which labels survive."""
         return energy + _TOLERANCE * (1 + energy) + self._rounding_margins()[1] - bound
 
-    def arrays(self, quanta: tuple[float, float]) -> tuple[Arrays, Arrays]:
-        """Messages and tables as whole numbers of their scales, after `quantise`."""
-        shares, (of_shares, of_tables) = (self.state.shares_first, self.state.shares_second), quanta
-        messages = share_arrays(self.lattice, shares, of_shares)
-        return messages, table_arrays(self.lattice, self.state.clusters, of_tables)
+    def arrays(self, quanta: tuple[float, float]) -> Arrays:
+        """The arrays of the level in a certificate, after `quantise`."""
+        lattice, (of_shares, of_tables) = self.lattice, quanta
+        ranges = (lattice.alpha_first, lattice.alpha_count, lattice.beta_first, lattice.beta_count)
+        return {
+            "h": np.array([lattice.h]),
+            "ranges": np.stack(ranges, axis=1).astype(np.int32),
+            "allowed": np.packbits(lattice.allowed),
+            **share_arrays(lattice, (self.state.shares_first, self.state.shares_second), of_shares),
+            **table_arrays(lattice, self.state.clusters, of_tables),
+        }
 
 
 def antidiagonals(grid: Grid) -> list[Indices]:

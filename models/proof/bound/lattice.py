@@ -22,6 +22,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
+from ...array_archive import Arrays
 from ...field.field import AbsoluteNorm, CrossField, Norm
 from ...field.jumps import step_labels
 from ...instance.angles import HALF, QUARTER, wrap
@@ -82,6 +83,15 @@ class Lattice:
         return cls(
             field.instance, h, alpha, beta, field.p, **ranges, norm=norm, slopes=np.clip(slopes, -most, most)
         )
+
+    def centre_arrays(self) -> Arrays:
+        """The centre, and unless the norm is 2 the slopes, as arrays of a certificate."""
+        arrays = {"centre_alpha": self.alpha, "centre_beta": self.beta}
+        if self.norm == 2:
+            return arrays
+        slopes = np.zeros(self.instance.grid.size)
+        slopes[self.instance.stroke_index] = self.slopes
+        return arrays | {"slopes": slopes}
 
     @cached_property
     def offset(self) -> Floats:

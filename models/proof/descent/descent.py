@@ -40,7 +40,7 @@ from ..bound.pruning import RemainingCells, finer_lattice, smaller_lattice
 from ..bound.rounding import Rounding, better_field
 from ..checkers.check_certificate import MOST_COUNT, has_forced_jump, level_memory, memory_for
 from .last_step import energy_terms, has_few_open, last_step_on, minimise_on_boxes
-from .record import EXACT, LevelRecord, Proof
+from .record import EXACT, Chain, Level, Proof
 
 # Levels
 COARSEST: Final = 16  # steps in pi/2 of the first level, whose passes cost least
@@ -107,29 +107,6 @@ class Termination:
 
 
 @dataclass
-class _Chain:
-    """The levels round one centre, and what they prove together.
-
-    convex: bound of the last step on the boxes that the last levels leave. pieces: arrays that prove it.
-    """
-
-    levels: list[LevelRecord] = field(default_factory=list)
-    convex: float = -math.inf
-    pieces: Arrays | None = None
-    forced: int = 0
-
-    @property
-    def bound(self) -> float:
-        """The bound that all levels prove together."""
-        return max([0.0, self.convex, *(level.bound for level in self.levels)])
-
-    @property
-    def last_of_spacings(self) -> list[LevelRecord]:
-        """The last level of each spacing."""
-        return list({level.h: level for level in self.levels}.values())
-
-
-@dataclass
 class Descent:
     """A descent in the 2-norm, and its state: the best field, and the chain of levels that proves most."""
 
@@ -143,8 +120,8 @@ class Descent:
     seed: int
     jobs: int
     progress: Progress
-    chain: _Chain = field(default_factory=_Chain)
-    proven: _Chain = field(default_factory=_Chain)
+    chain: Chain = field(default_factory=Chain)
+    proven: Chain = field(default_factory=Chain)
     searches: int = 0
     next_search: float = _FIRST_SEARCH
     began: float = 0.0
@@ -177,8 +154,8 @@ class Descent:
         """The proof so far, with the levels that prove it; not checked."""
         bound, energy = min(self.proven.bound, self.energy(self.best)), self.energy(self.best)
         return Proof(
-            self.best, energy, bound, self.proven.forced, tuple(self.proven.levels), seconds, ended,
-            self.norm, self.proven.pieces,
+            field=self.best, energy=energy, bound=bound, forced=self.proven.forced, norm=self.norm,
+            levels=tuple(self.proven.levels), seconds=seconds, ended=ended, arrays=self.proven.arrays,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -197,8 +174,9 @@ class Descent:
         """Go through the levels round the best field; the reason of the end, empty for a better field."""
         if reason := self.ends.reason():
             return reason
-        self.chain, centre = _Chain(), self.best
+        centre = self.best
         dual = Dual(self.first_level(_centre_at(centre)), self.crew)
+        self.chain = Chain(arrays=dual.lattice.centre_arrays())
         patient = False  # whether a finer lattice was too large, so that this one has the same spacing
         while True:
             self._add_clusters(dual)
@@ -249,9 +227,9 @@ class Descent:
         """Record the level and, in time, prune it; return the cells that are left, None if there are none."""
         chain, energy = self.chain, self.energy(self.best)
         rough, left = _ROUGH * (1 + energy), None
-        level = LevelRecord.of_dual(dual, energy, rough if self.gap > rough else 0.0)
+        level, arrays = record_of(dual, energy, rough if self.gap > rough else 0.0)
         if level.bound > chain.bound or not self.ends.over():
-            chain.levels.append(level)
+            chain.add(level, arrays)
         if not self.ends.over():
             one, _ = dual.expected_seconds(dual.lattice)
             left = dual.remaining_cells(level.bound, energy, combs=not self.ends.over(_COMBS * one))
@@ -271,9 +249,10 @@ class Descent:
         if has_few_open(terms, step):
             energy = self.energy(self.best)
             minimum = minimise_on_boxes(self.instance, terms, step, energy, self.ends.over)
-            convex = min(minimum.bound, chain.levels[-1].energy)
+            convex = min(minimum.bound, energy)
             if convex > chain.bound:
-                chain.convex, chain.pieces = convex, minimum.pieces
+                chain.convex = convex
+                chain.arrays |= minimum.pieces
             if minimum.bound < energy:
                 field = minimum.field
                 better = field_in_windows(self.instance, field.alpha, field.beta, field.p)
@@ -366,6 +345,15 @@ class Descent:
         """Report bound, least energy and remaining labels, and count the labels as work."""
         self.ends.labels += labels
         self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
+
+
+def record_of(dual: Dual, energy: float, least_gap: float = 0.0) -> tuple[Level, Arrays]:
+    """The level of a dual with its arrays; shares and tables are first rounded, as for that gap at least.
+
+    Where the bound exceeds the energy, rounding costs a small part of the excess.
+    """
+    quanta = dual.quantise(max(abs(energy - dual.bound()), least_gap))
+    return Level(dual.lattice.h, int(dual.lattice.allowed.sum()), dual.bound()), dual.arrays(quanta)
 
 
 def _slow_rise(left: float) -> float:

@@ -86,7 +86,7 @@ def has_few_open(terms: EnergyTerms, step: LastStep) -> bool:
 def fit_to_boxes(
     instance: Instance, terms: EnergyTerms, step: LastStep, pieces: Arrays, enough: float
 ) -> Arrays:
-    """The pieces of slightly larger boxes with new multipliers where theirs prove less than `enough`.
+    """The pieces of slightly larger boxes, with new multipliers where theirs prove less than `enough`.
 
     Raises NotProvenError where the pieces do not cover these boxes.
     """
@@ -94,7 +94,7 @@ def fit_to_boxes(
     for row, piece in zip(multipliers, pieces_of(terms, step, pieces["cuts"].tolist()), strict=True):
         if linear_bound(terms, step, piece, row) < enough:
             row[:] = _minimise_on_piece(instance, terms, step, piece).multipliers
-    return pieces | {"multipliers": multipliers}
+    return {"cuts": pieces["cuts"], "multipliers": multipliers}
 
 
 @dataclass(eq=False)

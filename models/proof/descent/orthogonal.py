@@ -31,7 +31,7 @@ from ..bound.orthogonal_dual import RingDual, update_rings
 from ..checkers import check_orthogonal as checker
 from ..checkers.check_certificate import OPTIMAL
 from ..checkers.check_orthogonal import CellLevel, CentredRows
-from .orthogonal_certificate import LevelFacts, OrthogonalProof
+from .record import INSTANCE, Chain, Level, Proof
 
 if TYPE_CHECKING:
     from .descent import Termination
@@ -64,7 +64,7 @@ _BETTER: Final = 1e-9  # relative: a better field; also what a level keeps more 
 
 def prove_orthogonal(
     instance: Instance, start: CrossField | None, ends: Termination, progress: Progress, seed: int = 0
-) -> tuple[OrthogonalProof, Floats | None]:
+) -> tuple[Proof, Floats | None]:
     """Find a field of orthogonal crosses, and prove a lower bound of the energy of all.
 
     The instance has the gauge `strokes`. The time limit includes the check, whose seconds are forecast.
@@ -78,22 +78,13 @@ def prove_orthogonal(
 
 
 @dataclass
-class _CentredLevels:
-    """Levels round one centre, and what they prove. arrays: of a certificate, without head and field."""
+class _TimedChain(Chain):
+    """A chain for which the time of its check is forecast. threshold: as of `Proof`."""
 
     threshold: float = math.inf
-    arrays: Arrays = field(default_factory=dict)
-    levels: list[LevelFacts] = field(default_factory=list)
-    forced: int = 0
-    convex: float = -math.inf
     gap: float = math.inf  # at the last level
     seconds: float = 0.0  # that the checker took
     pace: float = 0.0  # seconds per unit of work at the last level
-
-    @property
-    def bound(self) -> float:
-        """The bound that all levels prove together."""
-        return max([0.0, self.convex, *(level.bound for level in self.levels)])
 
 
 def two_colours(domain: Domain, near: Neighbours, fixed: Bools) -> NDArray[np.uint8]:
@@ -133,7 +124,7 @@ class _Prover:
     ends: Termination
     progress: Progress
     seed: int = 0
-    proven: _CentredLevels = field(default_factory=_CentredLevels)
+    proven: _TimedChain = field(default_factory=_TimedChain)
     arrays: Arrays = field(default_factory=dict)
     limit: Floats | None = None
     hunt: IntegerSearch | None = None
@@ -150,7 +141,7 @@ class _Prover:
         domain, arrays = self.instance.domain, instance_arrays(self.instance).items()
         length = np.diff(domain.rings.start)
         rings = domain.rings.keep((length >= 3) & (length <= checker.MOST_RING))
-        self.arrays = {f"instance_{name}": array for name, array in arrays}
+        self.arrays = {INSTANCE + name: array for name, array in arrays}
         self.arrays |= {"kappa": domain.kappa} if domain.kappa is not None else {}
         self.arrays |= {"ring_start": rings.start, "ring_pair": rings.pair}
         self.arrays |= {"ring_sign": rings.sign.astype(np.int8), "centre": np.zeros(domain.size)}
@@ -164,14 +155,14 @@ class _Prover:
         self.arrays["half"] = two_colours(domain, self.near, rows.fixed[:-1])
         self.limit = rows.limit
 
-    def proof(self, ended: str, began: float) -> OrthogonalProof:
+    def proof(self, ended: str, began: float) -> Proof:
         """The proof so far, not checked."""
         best, chain = field_of(self.instance, self.z, self.energy), self.proven
-        arrays = chain.arrays | {"alpha": best.alpha, "p": best.p}
         energy, levels = best.energy().total, tuple(chain.levels)
-        return OrthogonalProof(
-            best, energy, min(chain.bound, energy), chain.forced, levels, time.monotonic() - began, ended,
-            arrays, chain.threshold, reason="" if levels else self.reason,
+        return Proof(
+            field=best, energy=energy, bound=min(chain.bound, energy), forced=chain.forced, levels=levels,
+            seconds=time.monotonic() - began, ended=ended, arrays=chain.arrays, threshold=chain.threshold,
+            reason="" if levels else self.reason,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -240,15 +231,15 @@ class _Prover:
             rings = rings + more
             level, before = checker.next_level(level, squares, factor), dual
 
-    def _begin_chain(self) -> tuple[_CentredLevels, CentredRows]:
+    def _begin_chain(self) -> tuple[_TimedChain, CentredRows]:
         """A chain round the best field, without levels, and its rows."""
         best = field_of(self.instance, self.z, self.energy)
         arrays = self.arrays | {"centre": self.energy.fit_angles(self.z), "divisions": np.zeros(0, np.int32)}
         rows = checker.CentredRows(arrays, self.limit)
         energy, error, _ = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
-        return _CentredLevels(energy * (1 + _BETTER) + 2 * error, arrays), rows
+        return _TimedChain(arrays=arrays, threshold=energy * (1 + _BETTER) + 2 * error), rows
 
-    def _ascend(self, dual: RingDual, chain: _CentredLevels, ahead: float) -> bool:
+    def _ascend(self, dual: RingDual, chain: _TimedChain, ahead: float) -> bool:
         """Passes until the bound rises slowly, or few labels or seconds are left; whether rings close it."""
         reached, rings, closing, most = -math.inf, bool(dual.ring_numbers), False, chain.threshold
         for number in range(_MOST_PASSES):
@@ -324,7 +315,7 @@ class _Prover:
             self.z, self.least = z, total
         return better
 
-    def _record(self, chain: _CentredLevels, dual: RingDual, costs: Floats) -> Bools:
+    def _record(self, chain: _TimedChain, dual: RingDual, costs: Floats) -> Bools:
         """Add a level to its chain; the squares that the checker finds that it leaves, and a little more.
 
         Other processors round differently, and must not find more.
@@ -342,7 +333,7 @@ class _Prover:
         bits = np.packbits(squares[: level.squares.begin[rows.pairs]])
         chain.arrays |= {f"{prefix}forests": forests, f"{prefix}squares": bits}
         chain.arrays["divisions"] = np.append(chain.arrays["divisions"], np.int32(level.divisions))
-        chain.levels.append(LevelFacts(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
+        chain.levels.append(Level(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
         turns = checker.possible_turns(level, squares)
         chain.forced = int((turns[: rows.pairs] == checker.CENTRAL).all(axis=1).sum())
         cases = [(rows.nearest + np.array(case)).astype(np.int32) for case in checker.cases_of(turns)]
@@ -355,7 +346,7 @@ class _Prover:
         chain.seconds, chain.pace = chain.seconds + seconds, seconds / dual.work
         return squares
 
-    def _reason_to_end(self, chain: _CentredLevels) -> str:
+    def _reason_to_end(self, chain: _TimedChain) -> str:
         """The reason why the work ends; empty if it goes on."""
         if self.least - chain.bound <= OPTIMAL / 2 * max(1.0, self.least):
             return "optimal"

@@ -1,30 +1,98 @@
-"""The result of a proof: the field, the bound, and every level in a form that can be checked."""
+"""The result of a proof: a field, a bound of the energy of all fields, and the arrays that prove it."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Final, Literal, Self, cast
+import dataclasses
+import json
+import math
+from dataclasses import dataclass, field, replace
+from typing import Any, Final, Literal, NamedTuple, Self, cast
+
+import numpy as np
 
 from ...array_archive import Arrays
 from ...field.field import CrossField, Norm
-from ..bound.lattice import Lattice
-from ..checkers.check_certificate import ProvenClaim, gap_of, status_of
-
-if TYPE_CHECKING:
-    from ..bound.dual import Dual
+from ...instance.file import instance_arrays
+from ..checkers import check_certificate, check_orthogonal
+from ..checkers.check_certificate import Verdict, gap_of, status_of
 
 Status = Literal["optimal", "gap"]
 
 EXACT: Final = 4e-9  # gap relative to 1 + energy at which the prover ends; `status_of` allows a little more
+INSTANCE: Final = "instance_"
+"""Prefix of the names of the instance's arrays in a certificate."""
+
+
+class Level(NamedTuple):
+    """Spacing of the labels of a refinement level in radians, their number, and the bound of the level."""
+
+    h: float
+    size: int
+    bound: float
+
+
+@dataclass
+class Chain:
+    """The levels round one centre, coarsest first, and what they prove together.
+
+    arrays: those of the certificate without head, instance and field. convex: bound of the last step. forced:
+    number of pairs with the same jump in every field that could be better.
+    """
+
+    levels: list[Level] = field(default_factory=list)
+    arrays: Arrays = field(default_factory=dict)
+    convex: float = -math.inf
+    forced: int = 0
+
+    @property
+    def bound(self) -> float:
+        """The bound that all levels prove together."""
+        return max([0.0, self.convex, *(level.bound for level in self.levels)])
+
+    @property
+    def last_of_spacings(self) -> list[Level]:
+        """The last level of each spacing."""
+        return list({level.h: level for level in self.levels}.values())
+
+    def add(self, level: Level, arrays: Arrays) -> None:
+        """Add a level with its arrays."""
+        self.arrays |= {f"level_{len(self.levels)}_{name}": array for name, array in arrays.items()}
+        self.levels.append(level)
 
 
 @dataclass(frozen=True, eq=False)
 class Claim:
-    """A field and a proven lower bound of the energy of all fields."""
+    """A field, and a proven lower bound of the energy of all fields: what a certificate claims.
+
+    Parameters
+    ----------
+    field
+        The field. With status `optimal`, its energy is the minimum.
+    energy
+        Its energy in the norm.
+    bound
+        No field has a lower energy.
+    forced
+        Number of pairs whose jump equals the field's in every field that could be better.
+    norm
+        1, 2 or `mixed`.
+    proven
+        Findings of the checker; None before the check.
+
+    """
 
     field: CrossField
     energy: float
     bound: float
+    forced: int
+    norm: Norm = 2
+    proven: Verdict | None = dataclasses.field(default=None, init=False, repr=False)  # not by `replace`
+
+    def confirmed(self, proven: Verdict, **changes: Any) -> Self:
+        """The claim with the findings of the checker, and with other changes."""
+        claim = replace(self, forced=proven.forced, **changes)
+        object.__setattr__(claim, "proven", proven)
+        return claim
 
     @property
     def status(self) -> Status:
@@ -38,81 +106,57 @@ class Claim:
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LevelRecord(Lattice):
-    """One level of a proof: its lattice and a dual solution on it.
-
-    shares, tables: the arrays of shares and quads of a certificate (bound/encoding.py). bound: sum
-    over pixels of min (D + shares) + sum over pairs of min (c + tables - shares) + sum over clusters of min
-    (- tables), over allowed labels, minus a bound of its rounding error. energy: U when the level was pruned;
-    fields outside the next level have more (models/proof/bound/pruning.py).
-    """
-
-    shares: Arrays
-    tables: Arrays
-    bound: float
-    energy: float
-
-    @property
-    def size(self) -> int:
-        """Number of allowed labels."""
-        return int(self.allowed.sum())
-
-    @classmethod
-    def of_dual(cls, dual: Dual, energy: float, least_gap: float = 0.0) -> Self:
-        """The record of a dual, whose shares and tables are first rounded, as for that gap at least.
-
-        Where the bound exceeds the energy, rounding costs a small part of the excess.
-        """
-        quanta = dual.quantise(max(abs(energy - dual.bound()), least_gap))
-        return cls.on_lattice(dual.lattice, dual.arrays(quanta), bound=dual.bound(), energy=energy)
-
-    @classmethod
-    def on_lattice(
-        cls, lattice: Lattice, arrays: tuple[Arrays, Arrays], *, bound: float, energy: float
-    ) -> Self:
-        """The record of shares and tables on a lattice, which is without cached arrays."""
-        values = {entry.name: getattr(lattice, entry.name) for entry in fields(Lattice)}
-        return cls(**values, shares=arrays[0], tables=arrays[1], bound=bound, energy=energy)
-
-
-@dataclass(frozen=True, eq=False)
 class Proof(Claim):
-    """The best field found, and the proven bound.
+    """The best field found, the bound that is proven, and how: a claim with its proof.
 
     Parameters
     ----------
-    field
-        The field.
-    energy
-        Its energy in the norm of the proof.
-    bound
-        No field has a lower energy, as the checker confirms: the bound that the certificate claims.
-    forced
-        Number of pairs with the same jump in every field that could be better.
+    field, energy, bound, forced, norm, proven
+        As in `Claim`.
     levels
-        The last chain of lattices, coarsest first, on the parts of the mask that have a stroke. Each covers
+        The last chain of levels, coarsest first, on the parts of the mask that have a stroke. Each covers
         what the one before leaves.
     seconds
-        Duration of the work without the check.
+        Duration of the work; for crosses of any angle without the check.
     ended
         `optimal`, `gap` (the requested one), `time`, `work`, `interrupted`, `labels` if the next level would
         be too large or prove no more, or `memory` if it took more than there is.
-    norm
-        1, 2 or `mixed`.
-    proven
-        Findings of the checker; None before the check.
-    pieces
-        The arrays of the certificate that prove the last step, None without one.
+    arrays
+        The arrays of the certificate without its head, its instance and its field.
+    threshold
+        The energy for which the levels of orthogonal crosses were pruned.
     reason
         Why nothing is proven, where `ended` does not state it; empty otherwise.
 
     """
 
-    forced: int
-    levels: tuple[LevelRecord, ...]
+    levels: tuple[Level, ...]
     seconds: float
     ended: str
-    norm: Norm = 2
-    pieces: Arrays | None = field(default=None, repr=False)
+    arrays: Arrays = dataclasses.field(repr=False)
+    threshold: float = math.inf
     reason: str = ""
-    proven: ProvenClaim | None = field(default=None, init=False, repr=False)  # `replace` leaves it out
+
+    def certificate(self) -> Arrays:
+        """The arrays of the certificate, with the claim."""
+        instance, orthogonal = self.field.instance, self.field.instance.orthogonal
+        checker = check_orthogonal if orthogonal else check_certificate
+        head = {"format": checker.FORMAT, "version": checker.VERSION, "status": self.status}
+        head |= {"energy": self.energy, "bound": self.bound}
+        of_levels = {"levels": len(self.levels), "norm": self.norm}
+        head |= {"threshold": self.threshold} if orthogonal else of_levels
+        arrays: Arrays = {"head": np.frombuffer(json.dumps(head).encode(), dtype=np.uint8)}
+        arrays |= {INSTANCE + name: array for name, array in instance_arrays(instance).items()}
+        beta = {} if orthogonal else {"beta": self.field.beta}
+        return arrays | {"alpha": self.field.alpha, **beta, "p": self.field.p} | self.arrays
+
+    def with_levels(self, count: int, ended: str) -> Proof:
+        """A proof of crosses of any angle, with the first levels alone and no last step; not checked."""
+        dropped = tuple(f"level_{number}_" for number in range(count, len(self.levels)))
+        kept = {
+            name: array
+            for name, array in self.arrays.items()
+            if not name.startswith(dropped) and name not in ("cuts", "multipliers")
+        }
+        levels = self.levels[:count]
+        return replace(self, levels=levels, arrays=kept, bound=0.0, forced=0, ended=ended)

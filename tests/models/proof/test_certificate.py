@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import places
 import pytest
-from allowed_labels import with_allowed
+from allowed_labels import allowed_of, with_allowed
 from archives import forged, members_of, npy, of_numpy, packed
 from crossfield.export.cli.app import invoke
 from crossfield.models.array_archive import pack_arrays
@@ -116,7 +116,7 @@ def test_a_part_without_strokes_has_no_cost_at_the_optimum(norm, tmp_path):
     beta = proof.field.beta + np.where(instance.grid.rows + instance.grid.columns == 0, 0.1, 0.0)
     worse = CrossField(instance, proof.field.alpha, beta, proof.field.p)
     energy = worse.energy(norm).total
-    less = replace(proof, field=worse, energy=energy, levels=proof.levels[:1])
+    less = replace(proof.with_levels(1, "gap"), field=worse, energy=energy)
     certificate = write_certificate(less, path, force=True)
     assert (certificate.status, read_certificate(path).status) == ("gap", "gap")
     assert certificate.bound <= written.energy
@@ -212,14 +212,12 @@ def test_levels_that_do_not_follow_are_not_written(written, tmp_path):
     path = tmp_path / "it.npz"
     path.write_bytes(b"kept")
     label = 2  # any that has to be there
-    allowed = proof.levels[1].allowed.copy()
+    allowed = allowed_of(arrays, 1)
     allowed[label] = False
     fewer = with_allowed(arrays, 1, allowed)
-    shares = {name: fewer[f"level_1_{name}"] for name in proof.levels[1].shares}
-    less = replace(proof.levels[1], allowed=allowed, shares=shares)
-    levels = (proof.levels[0], less, *proof.levels[2:])
+    less = proof.arrays | {name: fewer[name] for name in proof.arrays if name.startswith("level_1_")}
     with pytest.raises(InputError, match=r"it\.npz: would hold a proof that is not valid: level 1, pixel 0"):
-        write_certificate(replace(proof, levels=levels), path, force=True)
+        write_certificate(replace(proof, arrays=less), path, force=True)
     assert path.read_bytes() == b"kept"
 
 

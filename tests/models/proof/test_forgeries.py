@@ -15,7 +15,6 @@ from archives import forged, members_of, npy, packed
 from crossfield.models.errors import InputError, InstanceError
 from crossfield.models.field.field import CrossField
 from crossfield.models.instance.file import instance_of_arrays
-from crossfield.models.proof.bound.clusters import zero_clusters
 from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.checkers import check_certificate
 from crossfield.models.proof.prove import prove
@@ -40,14 +39,15 @@ def proof_of_kind(kind):
         field = CrossField(field.instance, field.alpha, field.beta + np.array([0, 0.01, 0, 0]), field.p)
     proof = prove_round(field, levels=3)
     if kind == "tables":
-        *before, last = proof.levels
-        clusters = zero_clusters(last, np.zeros(1, int))
+        grid, last = field.instance.grid, f"level_{len(proof.levels) - 1}_"
+        side = proof.arrays[f"{last}ranges"][:, 1]
+        size = int(side[grid.first] @ side[grid.second])
         tables = {
-            "quads": field.instance.grid.first[clusters.quads[:, 0]].astype(np.int32),
-            "table_steps": np.random.default_rng(3).integers(-1, 2, clusters.start[-1]).astype(np.int32),
-            "table_unit": np.full(4, COARSE),
+            f"{last}quads": grid.first[grid.quads[:, 0]].astype(np.int32),
+            f"{last}table_steps": np.random.default_rng(3).integers(-1, 2, size).astype(np.int32),
+            f"{last}table_unit": np.full(4, COARSE),
         }
-        proof = replace(proof, levels=(*before, replace(last, tables=tables)))
+        proof = replace(proof, arrays=proof.arrays | tables)
     return proof
 
 

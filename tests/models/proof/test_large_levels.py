@@ -18,7 +18,7 @@ def test_where_no_finer_level_fits_a_smaller_one_raises_the_bound(monkeypatch, t
     assert proof.ended == "labels"
     assert [round(np.pi / 2 / level.h) for level in proof.levels] == [16, 32, 32]
     before, last = proof.levels[-2:]
-    assert last.allowed.sum() < before.allowed.sum()
+    assert last.size < before.size
     assert last.bound > before.bound
     # The checker has the best shares of later pixels, so it may prove more than the rounded ones.
     assert last.bound * (1 - 1e-5) <= proof.bound <= proof.energy

@@ -21,12 +21,12 @@ from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.mesh import Mesh
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
 from crossfield.models.processes.deadline import Deadline, never, silent
+from crossfield.models.proof.certificate import check_proof
 from crossfield.models.proof.checkers import check_certificate
 from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError, unpack_archive
 from crossfield.models.proof.descent.descent import Termination
 from crossfield.models.proof.descent.orthogonal import prove_orthogonal
-from crossfield.models.proof.descent.orthogonal_certificate import check_proof
 from small_meshes import (
     beyond_forest,
     keeps_optimum,

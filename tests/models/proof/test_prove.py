@@ -212,19 +212,19 @@ def test_turned_and_mirrored_sketches_have_the_same_proven_optimum():
 
 def test_the_levels_are_a_chain_round_one_centre_and_its_bound_is_theirs():
     proof = cf.prove(random_instance(4, shape=(4, 4)), jobs=1)
-    for level in proof.levels:
-        size = level.alpha_count.astype(int) * level.beta_count
-        assert len(level.allowed) == size.sum()
+    for number, level in enumerate(proof.levels):
+        at = f"level_{number}_"
+        size = proof.arrays[f"{at}ranges"][:, 1::2].astype(int).prod(axis=1)
+        allowed = np.unpackbits(proof.arrays[f"{at}allowed"], count=size.sum())
         grid = proof.field.instance.grid
-        steps = len(level.shares["share_steps"])
-        labels = np.add.reduceat(level.allowed, np.cumsum(size) - size, dtype=int)
-        assert steps == labels[np.minimum(grid.first, grid.second)].sum()
-        assert len(set(level.shares["share_unit"])) == 1
-        assert level.bound <= proof.energy <= level.energy
-        np.testing.assert_array_equal(level.alpha, proof.levels[0].alpha)
-        np.testing.assert_array_equal(level.p, proof.levels[0].p)
+        labels = np.add.reduceat(allowed, np.cumsum(size) - size, dtype=int)
+        assert len(proof.arrays[f"{at}share_steps"]) == labels[np.minimum(grid.first, grid.second)].sum()
+        assert len(set(proof.arrays[f"{at}share_unit"])) == 1
+        assert labels.sum() == level.size
+        assert level.bound <= proof.energy
+        assert level.h == proof.arrays[f"{at}h"]
     for before, after in pairwise(proof.levels):
-        narrower = after.h == before.h and after.allowed.sum() < before.allowed.sum()
+        narrower = after.h == before.h and after.size < before.size
         assert narrower or after.h == before.h / 2
 
 

@@ -6,9 +6,10 @@ from crossfield.models.field.field import CrossField
 from crossfield.models.processes.compilation import crew
 from crossfield.models.proof.bound.dual import Dual
 from crossfield.models.proof.bound.lattice import Lattice
-from crossfield.models.proof.certificate import _head_arrays, _proof_arrays
 from crossfield.models.proof.checkers import check_certificate
-from crossfield.models.proof.descent.record import LevelRecord, Proof
+from crossfield.models.proof.descent.descent import record_of
+from crossfield.models.proof.descent.record import Chain
+from proofs_round_fields import proof_of
 
 
 def test_a_centre_whose_other_line_carries_the_stroke_has_a_certificate(tmp_path):
@@ -24,9 +25,10 @@ def test_every_label_costs_what_the_checker_computes():
     lines = rng.uniform(0, np.pi, (2, instance.grid.size))
     field = CrossField.from_lines(instance, *lines)
     with crew(1) as hands:
-        level = LevelRecord.of_dual(Dual(Lattice.whole(field, 16), hands), field.energy().total)
-    proof = Proof(field, field.energy().total, 0.0, 0, (level,), 0.0, "labels")
-    arrays = _head_arrays(proof) | _proof_arrays(proof)
+        level, energy = Lattice.whole(field, 16), field.energy().total
+        chain = Chain(arrays=level.centre_arrays())
+        chain.add(*record_of(Dual(level, hands), energy))
+    arrays = proof_of(field, energy, chain).certificate()
     terms, _ = check_certificate.terms_of(arrays)
     same = check_certificate.level_of(arrays, 0, terms)
     mine = np.split(level.unary_costs(), level.start[1:-1])
