@@ -33,7 +33,7 @@ from .descent.record import INSTANCE, Claim, Proof
 REFUSALS: Final = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 """Errors of the checker for a proof that does not hold."""
 
-_FEW, _MANY = 400_000, 30_000_000
+_FEW_LABELS, _MANY_LABELS = 400_000, 30_000_000
 """Labels of a proof whose check takes longer than to start processes, and 3 GB of memory."""
 
 
@@ -177,7 +177,7 @@ def _pass_function(arrays: Arrays, jobs: int, progress: Progress) -> Iterator[Ca
     """A function that does the passes over all levels as the checker asks for, and says how many are done."""
     levels = [array for name, array in arrays.items() if name.endswith("_allowed")]
     labels = 8 * sum(array.size for array in levels)
-    processes = min(jobs, len(levels)) if _FEW <= labels <= _MANY else 1
+    processes = min(jobs, len(levels)) if _FEW_LABELS <= labels <= _MANY_LABELS else 1
     with process_pool(processes) as pool:
 
         def pass_all(work: Callable[..., Any], tasks: list[Any]) -> Iterator[Any]:

@@ -53,7 +53,7 @@ from .state import Clusters, Indices, State, state_on
 
 _TOLERANCE: Final = 1e-7  # excess over the energy with which labels still survive, relative to 1 + it
 _LOST: Final = 0.3  # share of the gap that rounding may cost at most; a fifth of it is usual
-_TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
+_LOST_TABLES: Final = 0.25  # of this, the part of the tables, which are few but large
 _LEVELS: Final = 64  # more than usual; the checker allows for the sides of domains at each
 _BEYOND: Final = 1.5  # step of tables before the last update: 29 % more per pass on mouse at 48 pixels;
 # the least values of clusters are then not 0, so only the last pass states the bound
@@ -201,7 +201,7 @@ class Dual:
         least = 2.0 ** (math.ceil(math.log2(most)) - 30)
         # Shares and tables, wrong by half a quantum, enter the minima of pixels and pairs, or of clusters.
         wrong = np.array([2 * len(self.lattice.p), 4 * len(self.quads)])
-        lost = _LOST * gap * np.array([1 - _TABLES, _TABLES]) / np.maximum(wrong, 1)
+        lost = _LOST * gap * np.array([1 - _LOST_TABLES, _LOST_TABLES]) / np.maximum(wrong, 1)
         of_shares, of_tables = (
             min(2.0 ** math.floor(math.log2(max(most_lost, least))), check_certificate.MOST_UNIT)
             for most_lost in lost

@@ -16,7 +16,7 @@ from ...instance.domain import Floats
 from ...processes.compilation import compiled, compiled_in_any_order, inlined
 from .state import RowEnds, State
 
-_NEAR: Final = 1  # terms on both sides of the best one of a row that come before the others
+_BEFORE: Final = 1  # terms on both sides of the best one of a row that come before the others
 
 
 class RightMatrix(NamedTuple):
@@ -47,7 +47,7 @@ def lower_rows(targets: Floats, left: Floats, terms: RightMatrix, begin: int, en
     best = 0
     while sums[best] > lowest:
         best += 1
-    _lower_four(targets, left, terms.rows, zero, max(0, min(best - _NEAR, many - 4)), begin, end)
+    _lower_four(targets, left, terms.rows, zero, max(0, min(best - _BEFORE, many - 4)), begin, end)
     reached = _most_of_rows(targets, width)
     for first in range(0, many, 4):
         y = min(first, many - 4)

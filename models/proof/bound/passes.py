@@ -13,6 +13,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from ...instance.angles import HALF
 from ...instance.domain import Floats
 from ...processes.compilation import compiled, compiled_inside, inlined
 from .min_plus import (
@@ -30,7 +31,6 @@ PASS: Final = 0
 MINIMA: Final = 1
 COMB: Final = 2
 
-_HALF: Final = float(np.pi / 2)
 _PI: Final = float(np.pi)
 
 
@@ -338,7 +338,7 @@ def step_costs(pair: int, i: int, state: State, odd: bool, of_steps: Floats) -> 
     j, last = state.pairs[pair].first + state.pairs[pair].second - i, state.pixels[i].alpha_count - 1
     a = state.pixels[i].alpha - state.pixels[j].alpha
     if odd:
-        a += _HALF
+        a += HALF
     for place in range(of_steps.size):
         of_steps[place] = 2 * size_of(least_a(a + state.h * (last - place)), state.power)
     return least_value(of_steps)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...field.field import CrossField, field_in_windows
 from ...field.jumps import free_jumps
-from ...instance.angles import QUARTER
+from ...instance.angles import HALF, QUARTER
 from ...instance.domain import Bools, Floats
 from ...instance.sparse_systems import SimilarSystems
 from ...processes.compilation import compiled, inlined
@@ -25,7 +25,6 @@ from .passes import add_to, least_a, shares_at, size_of
 from .state import Indices, State
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
-_HALF: Final = float(np.pi / 2)
 
 BetterField = Callable[[CrossField, CrossField, Over], CrossField]
 """Returns the better of a rounded field and the best one so far, improved."""
@@ -108,7 +107,7 @@ def _add_distance(i: int, state: State, alpha: float, beta: float, cost: Floats)
     columns = state.pixels[i].beta_count
     for row in range(state.pixels[i].alpha_count):
         even = state.pixels[i].alpha + state.h * row - alpha
-        even, odd = least_a(even), least_a(even + _HALF)
+        even, odd = least_a(even), least_a(even + HALF)
         for column in range(columns):
             mine = state.pixels[i].beta + state.h * column
             with_even = size_of(even, state.power) + size_of(mine - beta, state.power)

@@ -47,7 +47,7 @@ COARSEST: Final = 16  # steps in pi/2 of the first level, whose passes cost leas
 _FINEST: Final = 2**16  # steps in pi/2 of the last one: finer ones come near the digits of centres
 MOST_LABELS: Final = 50_000_000  # labels of a level, for memory: each takes some 100 bytes
 _OF_SHARE: Final = 32  # bytes of memory that the checker grants for each share, beside those for the share
-_TABLES: Final = 4  # numbers of tables that take as much memory as a label
+_TABLE_NUMBERS: Final = 4  # numbers of tables that take as much memory as a label
 _DECIMALS: Final = 7  # digits of centres in rad: their last digits differ between processors
 _SETTLED: Final = 4  # spacings after which little is lost where the centre is another field
 
@@ -56,8 +56,8 @@ _PASSES: Final = 3  # passes forwards and backwards between two roundings, which
 _MOST_ROUNDS: Final = 40  # roundings of a level, in case that the bound creeps
 _SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
 _SLOWEST: Final = 0.005  # the same where the finer level would be too large
-_FEW: Final = 600_000  # labels of which passes take less time than one more level of the certificate
-_FEWER: Final = 0.5  # share of more labels that are left, at which passes go on over these only
+_FEW_LABELS: Final = 600_000  # labels of which passes take less time than one more level of the certificate
+_FEW_LEFT: Final = 0.5  # share of more labels that are left, at which passes go on over these only
 _RECORD: Final = 11  # passes that take as long as a record with combs, and two before it
 _COMBS: Final = 5  # of these, the combs
 _NEAR: Final = 100  # jumps left open by a level after which the combs of the next may leave few enough
@@ -69,7 +69,7 @@ _CLUSTERS_OF_ALL: Final = 0.08  # the same as a share of all quads, if that is m
 _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above which there are more
 
 # Fields
-_BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
+_MUCH_BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
 _WIDE: Final = 0.01  # relative gap of a level above which a poor field may cause it, without a limit of time
 _FIRST_SEARCH: Final = 3.0  # seconds after which a proof searches: many need none
 _NEXT_SEARCH: Final = 4.0  # times as late as a search, the next one
@@ -187,7 +187,7 @@ class Descent:
             if (reason := self._reason_to_end()) or left is None:
                 return reason or "time"
             lattice = smaller_lattice(left) if rising and not patient else finer_lattice(left)
-            better = self.energy(self.best) < self.energy(centre) * (1 - _BETTER)
+            better = self.energy(self.best) < self.energy(centre) * (1 - _MUCH_BETTER)
             if better and len(self.chain.last_of_spacings) <= _SETTLED:
                 return self.ends.reason()
             if _is_too_large(dual, lattice) or not self._has_time_for(dual, lattice):
@@ -218,7 +218,7 @@ class Descent:
             left = dual.count_left(bound, energy) / labels
             if max(rises) <= (_SLOWEST if patient else _slow_rise(left)) and bound >= reached:
                 break
-            if labels > _FEW and left <= _FEWER and self._has_time_for(dual, dual.lattice):
+            if labels > _FEW_LABELS and left <= _FEW_LEFT and self._has_time_for(dual, dual.lattice):
                 return True  # passes over the labels that are left are worth a record of the level
             reached = bound
         return False
@@ -312,7 +312,7 @@ class Descent:
         )
         self.searches, self.tired = self.searches + 1, result.ended == "patience"
         self.best = min(self.best, result.field, key=self.energy)
-        return self.energy(self.best) < least * (1 - _BETTER)
+        return self.energy(self.best) < least * (1 - _MUCH_BETTER)
 
     def _has_time_for(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for a level on the next lattice: its record, and passes that take as long."""
@@ -370,7 +370,7 @@ def _is_too_large(dual: Dual, lattice: Lattice) -> bool:
     counts, grid = np.stack([lattice.alpha_count, lattice.beta_count], axis=1), lattice.instance.grid
     stored = int(lattice.allowed_count[np.minimum(grid.first, grid.second)].sum())
     return bool(
-        int(lattice.start[-1]) + tables // _TABLES > MOST_LABELS
+        int(lattice.start[-1]) + tables // _TABLE_NUMBERS > MOST_LABELS
         or counts.max() > MOST_COUNT
         or level_memory(counts, 0, 0) > memory_for(stored, _OF_SHARE)
         or lattice.h < np.pi / 2 / _FINEST

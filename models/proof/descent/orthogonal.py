@@ -48,7 +48,7 @@ _MOST_PASSES: Final = 200
 _PASSES: Final = 5  # between looks at the bound, and updates of rings if there are any
 _SLOW: Final = (0.08, 0.02)  # part of the gap: a smaller rise is slow; the latter for rings and wide gaps
 _BETWEEN: Final = 4  # passes between two updates of rings, which take longer
-_FEW: Final = 0.4  # share of labels left below which a record of the level pays
+_FEW_LEFT: Final = 0.4  # share of labels left below which a record of the level pays
 _CLOSER: Final = 0.3  # part of the gap of the last record, from which another one makes rings cheaper
 _ENOUGH: Final = 0.1  # the same for a tiny gap
 _TINY: Final = 1e-3  # relative gap below which finer labels follow
@@ -253,7 +253,7 @@ class _Prover:
             if self.ends.over(ahead) or closing or (rings and gap < _ENOUGH * chain.gap):
                 break
             if number % _PASSES == _PASSES - 1:
-                if bound - reached < _SLOW[rings and gap > _WIDE * most] * gap or left < _FEW:
+                if bound - reached < _SLOW[rings and gap > _WIDE * most] * gap or left < _FEW_LEFT:
                     break
                 reached = bound
         dual.pass_over(most, forward=True)
