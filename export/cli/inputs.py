@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
 
-from ...models.arguments import check_choice
 from ...models.errors import CrossfieldError, InputError
 from ...models.storage import require_suffix
 from ...models.written_files import check_targets
@@ -102,6 +101,8 @@ def check_names(names: list[str] | None, table: Mapping[str, Any], kind: str) ->
 
     Raises InputError for a name that is not in the table.
     """
+    from ...models.arguments import check_choice  # it loads NumPy
+
     for name in names or ():
         check_choice(kind, name, table)
     return list(dict.fromkeys(names or table))
