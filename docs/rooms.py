@@ -76,6 +76,9 @@ ROOMS: Final = {
 ROOMS["commands"] = Room("the command line", ("export/cli",), tuple(name for name in ROOMS if name != CORE))
 """The core first, and each room after those that it uses."""
 
+DEFAULT_JUMPS: Final = ("export/bundle", "models/search")
+"""The one use of a room by the core: where no field is given for jumps that a problem takes as data."""
+
 ORDER: Final = tuple(folder for room in ROOMS.values() for folder in room.folders)
 """From the ground up: a folder uses only earlier folders."""
 

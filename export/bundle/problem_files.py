@@ -240,6 +240,8 @@ def jumps_as_data(instance: Instance, name: str, start: CrossField | None) -> In
     """
     if not declaration_of(name).fixed:
         return None
-    from ...models.search.starts import first_field
+    if start is None:
+        from ...models.search.starts import first_field
 
-    return (start or first_field(instance)).p
+        start = first_field(instance)
+    return start.p

@@ -1,4 +1,1 @@
-"""Solving on this machine.
-
-`solve` runs every solver of the table on files that it writes; the modules of programs are in export/programs.
-"""
+"""Solving on this machine, by every program of the table (export/programs)."""

@@ -32,6 +32,7 @@ from ...models.storage import read_bytes, temporary_folder, write_bytes
 from ...models.written_files import check_targets, sha256_of
 from ..bundle.manifest import Manifest, read_manifest
 from ..formats.registry import FORMATS, problem_in_format
+from ..programs.comparison import algebra_difference, behaviour_difference
 from ..programs.model_content import Points
 from ..programs.protocol import NotReportedError, RefusedError, TooLargeError
 from ..solutions.solution import Solution
@@ -39,7 +40,6 @@ from ..solvers_table import PROGRAMS, SOLVERS, Program, Stage
 from ..solving.local import SolveFiles, Solvers
 from ..statuses import Status
 from .checks import Check, Verdict, Verification
-from .comparison import algebra_difference, behaviour_difference
 from .leeway import objective_leeway
 
 RESULT: Final = "verify.json"

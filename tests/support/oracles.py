@@ -17,10 +17,10 @@ from cases import names_of, points_of
 from crossfield.export.programs import highs as highs_program
 from crossfield.export.programs import scip as scip_program
 from crossfield.export.programs.casadi import read_nl
+from crossfield.export.programs.comparison import problem_algebra, values_at
 from crossfield.export.programs.model_content import Algebra as Model
 from crossfield.export.programs.model_content import Points
 from crossfield.export.solvers_table import PROGRAMS
-from crossfield.export.verify.comparison import problem_algebra, values_at
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.domain import Floats

@@ -24,9 +24,9 @@ from crossfield.export.bundle.problem_files import write_all, write_problem
 from crossfield.export.formats.registry import DEFAULTS, FORMATS, problem_in_format, write
 from crossfield.export.programs import glpk as glpk_program
 from crossfield.export.programs import scip as scip_program
+from crossfield.export.programs.comparison import behaviour_difference, problem_algebra, values_at
 from crossfield.export.programs.model_content import Points
 from crossfield.export.solutions.solution import read_solution
-from crossfield.export.verify.comparison import behaviour_difference, problem_algebra, values_at
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.export.writing.curvature import probtype
 from crossfield.models.errors import UnsupportedByFormatError

@@ -14,7 +14,7 @@ from cases import CASES, make_field, make_problem, names_of, problem_of
 from crossfield.export.formats import gams
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import gams as gams_program
-from crossfield.export.verify.comparison import behaviour_difference
+from crossfield.export.programs.comparison import behaviour_difference
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.formulations.names import column_names
 from crossfield.models.formulations.problem import Problem

@@ -11,7 +11,7 @@ import pytest
 from cases import CASES, LOW_DEGREE, SKEWED, make_instance, make_problem, names_of, points_of, problem_of
 from crossfield.export.formats import lp, mps
 from crossfield.export.formats.registry import FORMATS, header_lines, problem_in_format, write
-from crossfield.export.verify.comparison import algebra_difference
+from crossfield.export.programs.comparison import algebra_difference
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.models.errors import UnsupportedByFormatError
 from crossfield.models.formulations.names import column_names, row_names

@@ -15,7 +15,7 @@ from crossfield.export.formats.pyomo_model import to_pyomo
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import casadi as casadi_program
 from crossfield.export.programs import scip as scip_program
-from crossfield.export.verify.comparison import behaviour_difference
+from crossfield.export.programs.comparison import behaviour_difference
 from crossfield.export.writing.canonical import CanonicalForm
 from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.formulations.problem import Problem

@@ -9,8 +9,8 @@ from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
 from crossfield.export.programs import highs
+from crossfield.export.programs.comparison import algebra_difference
 from crossfield.export.verify.checks import Verdict
-from crossfield.export.verify.comparison import algebra_difference
 from crossfield.export.verify.verify import verify
 from crossfield.models.errors import FormulationError
 from crossfield.models.formulations.problem import formulate

@@ -48,3 +48,9 @@ def test_a_first_field_of_no_time_is_a_field_after_few_questions():
     field = first_field(cf.sample("mouse", 96), lambda: bool(calls.append(None)) or True)
     assert np.isfinite(field.energy().total)
     assert len(calls) <= 30
+
+
+def test_jumps_as_data_are_those_of_the_first_field_where_no_field_is_given(tmp_path):
+    instance = cf.sample("mouse", 5)
+    (manifest,) = cf.write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["mps"])
+    np.testing.assert_array_equal(manifest.problem().jumps, first_field(instance).p)

@@ -11,9 +11,9 @@ from scipy import sparse
 from ...models.formulations.names import column_names, decode_names, row_names
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Bools, Floats
-from ..programs.model_content import Algebra, Behaviour, Points, positions_of
 from ..writing.canonical import CanonicalForm
 from ..writing.terms import Terms, merged_terms, terms_of_triangle
+from .model_content import Algebra, Behaviour, Points, positions_of
 
 VALUES: Final = 1e-9
 """Relative difference up to which values at a point agree: sums may have another order."""

@@ -1,0 +1,108 @@
+"""Each room can be taken out: all other names stay, and without any room the core passes its tests."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from functools import cache
+from importlib import import_module
+
+import pytest
+from places import ROOT
+
+pytestmark = pytest.mark.slow
+
+ALL_NAMES = """
+import pathlib, crossfield
+assert pathlib.Path(crossfield.__file__).parent.parent == pathlib.Path.cwd(), crossfield.__file__
+for name in crossfield.__all__:
+    getattr(crossfield, name)
+print(*crossfield.__all__)
+"""
+
+
+@pytest.fixture(scope="module")
+def rooms(docs_module):
+    """The program that draws the rooms."""
+    return docs_module("rooms")
+
+
+def copy_without(rooms, gone, place):
+    """Copy the package without some rooms, those that use them, and their public names."""
+    for name, room in rooms.ROOMS.items():  # each after those that it uses
+        gone |= {name} if gone & {*room.uses} else set()
+    folders = [folder for name in gone for folder in rooms.ROOMS[name].folders]
+    package = place / "crossfield"
+    for part in rooms.PARTS:
+        shutil.copytree(ROOT / part, package / part, ignore=shutil.ignore_patterns("__pycache__", "known"))
+    for folder in folders:
+        shutil.rmtree(package / folder, ignore_errors=True)  # one may be inside of another
+    modules = "|".join(re.escape("." + folder.replace("/", ".")) for folder in folders)
+    of_room = re.compile(rf"from ({modules})\.|\"({modules})\.")
+    lines = (ROOT / "__init__.py").read_text(encoding="utf-8").splitlines(keepends=True)
+    rest = [line for line in lines if not of_room.search(line)]
+    (package / "__init__.py").write_text("".join(rest), encoding="utf-8")
+
+
+def run_python(place, *arguments):
+    """What a Python prints that finds the package in this place; it has to end well."""
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=place,
+        env=os.environ | {"PYTHONPATH": str(place)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def test_without_a_room_all_names_of_the_others_are_there(rooms, tmp_path):
+    home = import_module("crossfield")._HOME
+    for name in rooms.ROOMS.keys() - {rooms.CORE}:
+        place = tmp_path / name
+        copy_without(rooms, {name}, place)
+        left = run_python(place, "-c", ALL_NAMES).split()
+        assert left == [one for one in sorted(home) if (place / "crossfield" / file_of(home[one])).is_file()]
+        assert "formulate" in left
+
+
+def file_of(module):
+    """The file of a module of the package."""
+    return f"{module.lstrip('.').replace('.', '/')}.py"
+
+
+@cache
+def modules_of(path):
+    """The modules of the package that a test uses, itself or by its helpers."""
+    text, home = path.read_text(encoding="utf-8"), import_module("crossfield")._HOME
+    found = set(re.findall(r"^\s*from crossfield\.([\w.]+) import", text, re.MULTILINE))
+    found |= {home[name].lstrip(".") for name in re.findall(r"\bcf\.(\w+)", text) if name in home}
+    for helper in re.findall(r"^\s*(?:from|import) (\w+)", text, re.MULTILINE):
+        beside = ROOT / "tests" / "support" / f"{helper}.py"
+        if beside.is_file() and beside != path:
+            found |= modules_of(beside)
+    return frozenset(found)
+
+
+def test_the_core_passes_its_tests_without_any_room(rooms, tmp_path):
+    copy_without(rooms, {*rooms.ROOMS} - {rooms.CORE}, tmp_path)
+    tests = [
+        path
+        for folder in rooms.ROOMS[rooms.CORE].folders
+        for path in sorted((ROOT / "tests" / folder).glob("test_*.py"))
+        if all((tmp_path / "crossfield" / file_of(module)).is_file() for module in modules_of(path))
+    ]
+    assert {path.parent.name for path in tests} >= {"instance", "formulations", "formats", "solutions"}
+    for path in (ROOT / "tests" / "conftest.py", ROOT / "pyproject.toml", *tests):
+        copy = tmp_path / path.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(path, copy)
+    for folder in ("support", "data"):
+        shutil.copytree(ROOT / "tests" / folder, tmp_path / "tests" / folder)
+    print(run_python(tmp_path, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"))
