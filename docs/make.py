@@ -377,8 +377,7 @@ def write_architecture() -> None:
     import rooms
 
     (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
-    (DOCS / "architecture" / "rooms.csv").write_text(csv_text(rooms.rooms_table(DOCS.parent)))
-    (DOCS / "architecture" / "folders.csv").write_text(csv_text(rooms.table(DOCS.parent)))
+    (DOCS / "architecture" / "rooms.csv").write_text(csv_text(rooms.table(DOCS.parent)))
     some = ", ".join(f"`{command}`" for command in SKETCHES_ONLY)
     text = f"Every command takes sketches and meshes, except these, which take sketches only: {some}."
     replace_between(DOCS / "architecture.md", "domains", text)

@@ -114,18 +114,6 @@ def target_folders(root: Path, folder: str, node: ast.ImportFrom) -> set[str]:
     }
 
 
-def table(root: Path) -> list[dict[str, str]]:
-    """Rows in the order from the ground up: folder, content, imports besides the top of models/."""
-    return [
-        {
-            "folder": folder,
-            "content": first_line(root, folder),
-            "imports": " ".join(used_folders(root, folder)),
-        }
-        for folder in ORDER
-    ]
-
-
 def room_of(folder: str) -> str:
     """The room, or the core, that a folder belongs to."""
     return next(name for name, room in ROOMS.items() if folder in room.folders)
@@ -137,7 +125,7 @@ def lines_of(root: Path, room: Room) -> int:
     return round(sum(path.read_text(encoding="utf-8").count("\n") for path in paths), -2)
 
 
-def rooms_table(root: Path) -> list[dict[str, str]]:
+def table(root: Path) -> list[dict[str, str]]:
     """Rows: room, content, folders, rooms that it may use, lines to hundreds."""
     return [
         {

@@ -19,7 +19,7 @@ def rooms(docs_module):
 def test_the_table_and_the_picture_are_those_of_the_rooms(rooms):
     with (ROOT / "docs" / "architecture" / "rooms.csv").open(newline="", encoding="utf-8") as file:
         written = list(csv.DictReader(file))
-    assert without_lines(map(str, written)) == without_lines(map(str, rooms.rooms_table(ROOT)))
+    assert without_lines(map(str, written)) == without_lines(map(str, rooms.table(ROOT)))
     picture = (ROOT / "docs" / "architecture.svg").read_text()
     assert without_lines([picture]) == without_lines([rooms.picture(ROOT)])
 
