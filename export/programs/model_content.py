@@ -1,6 +1,6 @@
 """The content of a model file as its program reads it, as plain arrays.
 
-export/verify/comparison.py states how it differs from the problem. There are two forms: an `Algebra` holds
+export/programs/comparison.py states how it differs from the problem. There are two forms: an `Algebra` holds
 the coefficients of costs, products and rows, as readers of LP and MPS report them, and a `Behaviour` the
 values of objective and rows at points, as readers of .nl and GAMS report them.
 """
