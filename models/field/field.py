@@ -264,23 +264,13 @@ class CrossField(Pictured):
         norm.
         """
         check_norm(norm)
-        instance, weighted = self.instance, self.instance.pair_terms.weighted
-        of_pairs = np.square if norm == 2 else np.abs
-        size = np.abs if norm == 1 else np.square
-        return Energy(
-            smooth=2
-            * float(
-                np.sum(weighted(of_pairs(self.residual_a))) + np.sum(weighted(of_pairs(self.residual_b)))
-            ),
-            strokes=instance.stroke_coefficient * float(np.sum(instance.w * size(self.residual_r))),
-            beta=instance.skew_coefficient * float(np.sum(size(self.beta))),
-        )
+        return energy_of(self.instance, self.alpha, self.beta, self.p, norm)
 
     @cached_property
     def pixel_energy(self) -> Floats:
         """Smooth 2-norm energy per pixel, each pair shared by its two pixels; shape (n,)."""
         domain = self.instance.domain
-        share = self.instance.pair_terms.weighted(self.residual_a**2 + self.residual_b**2)
+        share = self.instance.pair_terms.costs(self.alpha, self.beta, self.p) / 2
         ends, halves = np.concatenate([domain.first, domain.second]), np.concatenate([share, share])
         return np.bincount(ends, halves, domain.size).astype(np.float64)
 
@@ -386,6 +376,17 @@ class CrossField(Pictured):
         picture = np.full(self.instance.mask.shape, fill)
         picture[self.instance.mask] = values
         return picture
+
+
+def energy_of(instance: Instance, alpha: Floats, beta: Floats, p: Ints, norm: Norm = 2) -> Energy:
+    """The energy of angles (n,) and jumps (m,) in a norm, wherever they are."""
+    of_pairs = np.square if norm == 2 else np.abs
+    size = np.abs if norm == 1 else np.square
+    return Energy(
+        smooth=float(instance.pair_terms.costs(alpha, beta, p, of_pairs).sum()),
+        strokes=float(instance.stroke_terms.costs(alpha, beta, size).sum()),
+        beta=instance.skew_coefficient * float(size(beta).sum()),
+    )
 
 
 def field_in_windows(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:

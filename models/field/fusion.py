@@ -58,8 +58,7 @@ def fuse_fields(one: CrossField, other: CrossField) -> CrossField:
 def _pixel_costs(field: CrossField) -> Floats:
     """Contribution of each pixel to the energy without its neighbours, shape (n,)."""
     terms, instance = field.instance.stroke_terms, field.instance
-    residual = terms.residuals(field.alpha, field.beta)
-    strokes = terms.at_points(terms.weight * residual * residual, instance.domain.size)
+    strokes = terms.at_points(terms.costs(field.alpha, field.beta), instance.domain.size)
     skew: Floats = instance.skew_coefficient * field.beta * field.beta
     return strokes + skew
 

@@ -113,6 +113,11 @@ class StrokeTerms:
         """R of each term in radians, shape (s,), of the angles (n,) of all points."""
         return alpha[self.point] + beta[self.point] - self.goal
 
+    def costs(self, alpha: Floats, beta: Floats, size: np.ufunc = np.square) -> Floats:
+        """Weighted phi(R) of each term, shape (s,). size: phi, the square or the absolute value."""
+        costs: Floats = self.weight * size(self.residuals(alpha, beta))
+        return costs
+
     def at_points(self, values: Floats, size: int) -> Floats:
         """Sums of the terms' values at each of `size` points, shape (size,)."""
         return np.bincount(self.point, values, size).astype(np.float64, copy=False)

@@ -32,6 +32,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from scipy.linalg.blas import dgemm
 
+from ..field.field import energy_of
 from ..instance.angles import HALF
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
@@ -154,11 +155,7 @@ class Landscape:
 
     def defined_energy(self, inside: Floats) -> float:
         """The 2-norm energy of the field by its definition, with these angles (2k,) inside the patch."""
-        instance, (alpha, beta) = self.patch.instance, np.split(self._with_patch(inside), 2)
-        strokes = instance.stroke_terms
-        off = strokes.residuals(alpha, beta)
-        smooth = instance.pair_terms.costs(alpha, beta, self.p).sum()
-        return float(smooth + strokes.weight @ (off * off) + instance.skew_coefficient * (beta @ beta))
+        return energy_of(self.patch.instance, *np.split(self._with_patch(inside), 2), self.p).total
 
     def save_state(self) -> _State:
         """A state for `restore`."""
