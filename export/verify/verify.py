@@ -188,7 +188,7 @@ def random_field(problem: Problem, seed: int) -> CrossField:
     if not problem.formulation.options.limits:
         return field.with_best_jumps()  # |A| is at most pi/4
     energy = OrthogonalEnergy.of(problem.instance)
-    return field_of(problem.instance, energy.descend(integers_of(field))[0], energy)
+    return field_of(problem.instance, energy.descend(integers_of(field)), energy)
 
 
 @dataclass(frozen=True, eq=False)

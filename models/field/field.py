@@ -13,7 +13,7 @@ from ..errors import InputError, InstanceError
 from ..instance.angles import HALF, MOST_ANGLE, QUARTER, line_difference
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
-from ..instance.terms import parity_sign
+from ..instance.terms import parity_sign, quarter_turns
 from ..previews import Pictured
 from .jumps import best_jumps, label_of, step_labels
 
@@ -277,11 +277,10 @@ class CrossField(Pictured):
     @cached_property
     def singularities(self) -> Singularities:
         """Rings whose index, (defect - sum of kappa + pi/2 p along the ring) / 2 pi, is not zero."""
-        rings = self.instance.domain.rings
-        turn = rings.defect - rings.sums(self.instance.pair_terms.offset(self.p))
-        quarters = np.round(turn / HALF)
+        instance = self.instance
+        quarters = quarter_turns(instance.domain.rings, instance.pair_terms.offset(self.p))
         at = np.nonzero(quarters)[0]
-        return Singularities(self.instance, at.astype(np.int32), quarters[at] / 4)
+        return Singularities(instance, at.astype(np.int32), quarters[at] / 4)
 
     @cached_property
     def degenerate(self) -> Bools:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .angles import HALF
-from .domain import Floats, Ints
+from .domain import Floats, Ints, Rings
 
 _SLACK = 1e-9  # quarter turns by which rounding may move the end of a range of jumps
 
@@ -21,6 +21,11 @@ _SLACK = 1e-9  # quarter turns by which rounding may move the end of a range of 
 def parity_sign(p: Ints) -> Floats:
     """The sign (-1)^p of each jump."""
     return 1.0 - 2.0 * (p & 1).astype(np.float64)
+
+
+def quarter_turns(rings: Rings, offsets: Floats) -> Ints:
+    """The quarter turns of a cross along each ring, (r,), with these turns of labels along pairs, (m,)."""
+    return np.round((rings.defect - rings.sums(offsets)) / HALF).astype(np.int32)
 
 
 @dataclass(frozen=True, eq=False)

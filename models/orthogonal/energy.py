@@ -97,12 +97,16 @@ class OrthogonalEnergy(RightAngles):
         return np.maximum(self.weight * (1 - self.weight * resistance), 0.0)
 
     def gains(self, residual: Floats) -> Floats:
-        """Change of the energy by the better step of each integer, against the sign of its residual, (r,).
+        """Change of the energy by the better step of each integer, (r,), as of `better_steps`.
 
         residual: that of the best angles for the present integers; angles follow the step.
         """
         change: Floats = HALF * HALF * self.stiffness - 2 * HALF * self.weight * np.abs(residual)
         return change
+
+    def better_steps(self, residual: Floats) -> Ints:
+        """The better step of each integer, 1 or -1: against the sign of its residual."""
+        return np.where(residual > 0, -1, 1).astype(np.int32)
 
     def step_residuals(self, residual: Floats, rows: Ints, steps: Ints) -> Floats:
         """The residuals of the best angles after steps of some integers, from those before them, (r,).
@@ -115,22 +119,21 @@ class OrthogonalEnergy(RightAngles):
         changed[rows] += HALF * steps
         return changed
 
-    def descend(self, z: Ints, over: Over = never, residual: Floats | None = None) -> tuple[Ints, Floats]:
+    def descend(self, z: Ints, over: Over = never) -> Ints:
         """Change single integers, the one of greatest gain first, until none lowers the energy.
 
         With more than 6,000 points, round all to the best angles in turn. Gains lose their digits where
         weights differ by many orders of magnitude. So a change has to lower the energy of the residuals,
-        which always is one of some angles, and no integers come twice. residual: that of the best angles for
-        z, if it is known. Returns the integers and their residuals.
+        which always is one of some angles, and no integers come twice.
         """
-        z, residual = z.copy(), self.residuals(self.fit_angles(z), z) if residual is None else residual
+        z, residual = z.copy(), self.residuals(self.fit_angles(z), z)
         total, failed = self.total(residual), np.zeros(len(z), dtype=bool)
         while len(z) and self.size <= MOST_DENSE and not over():
             change = np.where(failed, 0.0, self.gains(residual))
             row = np.argmin(change, keepdims=True).astype(np.int32)
             if total + change[row[0]] >= lowered(total):
                 break
-            step = np.where(residual[row] > 0, -1, 1).astype(np.int32)
+            step = self.better_steps(residual[row])
             moved = self.step_residuals(residual, row, step)
             reached = self.total(moved)
             failed[row] = reached >= lowered(total)
@@ -143,7 +146,7 @@ class OrthogonalEnergy(RightAngles):
             if self.total(moved) >= lowered(total):
                 break
             z, residual, total = nearest, moved, self.total(moved)
-        return z, residual
+        return z
 
 
 def integers_of(field: CrossField) -> Ints:

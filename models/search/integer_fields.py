@@ -41,7 +41,7 @@ def starting_integers(
     starts = [energy.nearest(power_field(instance).alpha), round_greedily(energy, over)]
     if start is not None:
         starts.append(integers_of(start))
-    return [energy.descend(z, over)[0] for z in starts]
+    return [energy.descend(z, over) for z in starts]
 
 
 def have_energies_of_fields(instance: Instance) -> bool:

@@ -27,7 +27,7 @@ from __future__ import annotations
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 from scipy.linalg.blas import dgemm
@@ -39,6 +39,7 @@ from ..instance.instance import Instance
 from ..instance.least_squares import residuals_at
 from ..instance.sparse_systems import PULL
 from ..instance.terms import PairTerms, parity_sign
+from ..orthogonal.energy import OrthogonalEnergy
 from .box_qp import stroke_bounds
 
 STEPS: Final = np.array([1, -1], dtype=np.int32)  # changes of one jump in the rows of `gains`
@@ -124,6 +125,8 @@ class Landscape:
     LinAlgError when the jumps lead to a system that double precision cannot solve.
     """
 
+    patience: ClassVar = 4
+
     def __init__(self, patch: Patch, x: Floats, p: Ints) -> None:
         """Start at the angles x (2n,), which are solved for inside the patch, and jumps p (m,)."""
         self.patch = patch
@@ -147,6 +150,20 @@ class Landscape:
         inside = np.clip(self._x, self._lower, self._upper)
         return FieldPoint(self.defined_energy(inside), self._with_patch(inside), self.p.copy())
 
+    @property
+    def bounded_energy(self) -> float:
+        """The energy by definition of the field within its bounds."""
+        return self.point.energy
+
+    @property
+    def offsets(self) -> Floats:
+        """The turn of labels of each pair of the patch, (e,), in radians."""
+        return self.patch.terms.offset(self.p[self.patch.pairs])
+
+    def at(self, jumps: Ints) -> Landscape:
+        """The landscape at other jumps (m,), computed anew."""
+        return Landscape(self.patch, self.angles, jumps)
+
     def _with_patch(self, inside: Floats) -> Floats:
         """The angles (2n,) of the whole field with these angles (2k,) inside the patch."""
         x = self._around.copy()
@@ -155,7 +172,8 @@ class Landscape:
 
     def defined_energy(self, inside: Floats) -> float:
         """The 2-norm energy of the field by its definition, with these angles (2k,) inside the patch."""
-        return energy_of(self.patch.instance, *np.split(self._with_patch(inside), 2), self.p).total
+        alpha, beta = np.split(self._with_patch(inside), 2)
+        return energy_of(self.patch.instance, alpha, beta, self.p).total
 
     def save_state(self) -> _State:
         """A state for `restore`."""
@@ -196,6 +214,10 @@ class Landscape:
             believed = np.isfinite(gains) & (ratio > 0) & (gains >= -self.energy * (1 + _DRIFT) - _DRIFT)
         gains[~believed] = np.inf
         return gains
+
+    def step(self, row: int, place: int) -> None:
+        """Make the step with these numbers in `gains`."""
+        self.change(np.array([place]), STEPS[[row]])
 
     def turn_gains(self) -> Floats:
         """Change of the energy when one stroke passes to line v by the shorter turn, (t,); inf if unknown."""
@@ -348,3 +370,51 @@ class Landscape:
         self.energy += share * off * off
         self._x += column[:, 0] * (share * off)
         self._update(-share, column, column)
+
+
+class IntegerLandscape:
+    """The least energy of orthogonal crosses at integers p (r,) that change step by step."""
+
+    patience: ClassVar = 1
+
+    def __init__(self, terms: OrthogonalEnergy, p: Ints) -> None:
+        """Start at integers p."""
+        self.terms, self.p = terms, p.copy()
+        self._residual = terms.residuals(terms.fit_angles(p), p)
+        self.energy = terms.total(self._residual)
+
+    @property
+    def bounded_energy(self) -> float:
+        """The energy; no angle has bounds."""
+        return self.energy
+
+    @property
+    def offsets(self) -> Floats:
+        """The turn of labels of each row, (r,), in radians."""
+        return self.terms.constant + HALF * self.p
+
+    def at(self, jumps: Ints) -> IntegerLandscape:
+        """The landscape at other integers, computed anew."""
+        return IntegerLandscape(self.terms, jumps)
+
+    def gains(self) -> Floats:
+        """Change of the energy for the better step of each integer, (1, r)."""
+        return self.terms.gains(self._residual)[None]
+
+    def step(self, _: int, place: int) -> None:
+        """Make the better step of an integer."""
+        self.change(np.array([place]), self.terms.better_steps(self._residual[[place]]))
+
+    def change(self, rows: Ints, steps: Ints) -> None:
+        """Add steps (c,) to the integers with those numbers, each at most once."""
+        self._residual = self.terms.step_residuals(self._residual, rows, steps)
+        self.p[rows] += steps
+        self.energy = self.terms.total(self._residual)
+
+    def save_state(self) -> tuple[Ints, Floats, float]:
+        """A state for `restore`."""
+        return self.p.copy(), self._residual, self.energy
+
+    def restore(self, state: tuple[Ints, Floats, float]) -> None:
+        """Restore a saved state."""
+        self.p, self._residual, self.energy = state[0].copy(), *state[1:]

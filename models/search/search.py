@@ -20,7 +20,6 @@ from ..instance.domain import Bools
 from ..instance.instance import Instance
 from ..instance.sparse_systems import SimilarSystems
 from ..orthogonal.energy import OrthogonalEnergy, lowered, takes_integers
-from ..orthogonal.search import IntegerSearch
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
 from ..processes.job_counts import check_jobs
@@ -31,6 +30,7 @@ from ..smooth.polyvector import power_field
 from .box_qp import FreeField, stroke_bounds
 from .improvement import pixel_curves, settle
 from .integer_fields import finish_field, have_energies_of_fields, starting_integers
+from .integer_search import IntegerSearch
 from .landscape import FieldPoint
 from .starts import polyvector_start, rounded_energy, start_fields
 from .stroked_parts import extended, restricted, stroked_parts
@@ -165,17 +165,17 @@ def _search_integers(
     fields, is_exact = [start] if start else [], have_energies_of_fields(instance)
     kind = "energy" if is_exact else "energy with right angles"
     if not is_exact:
-        fields.append(finish_field(instance, energy, hunt.best.z, sooner))
-    energies = [(0, hunt.best.total if is_exact else min(field.energy().total for field in fields))]
+        fields.append(finish_field(instance, energy, hunt.best.p, sooner))
+    energies = [(0, hunt.best.energy if is_exact else min(field.energy().total for field in fields))]
     while not (ended := ends.reason_to_end(hunt.round)):
         if hunt.fruitless > _PATIENCE * energy.size:
             ended = "patience"
             break
         hunt.explore(ends.over)
-        if is_exact and hunt.best.total < energies[-1][1]:
-            energies.append((hunt.round, hunt.best.total))
-        progress(f"{kind} {hunt.best.total:.5g} after {hunt.round} rounds")
-    fields.append(finish_field(instance, energy, hunt.best.z, closing()))
+        if is_exact and hunt.best.energy < energies[-1][1]:
+            energies.append((hunt.round, hunt.best.energy))
+        progress(f"{kind} {hunt.best.energy:.5g} after {hunt.round} rounds")
+    fields.append(finish_field(instance, energy, hunt.best.p, closing()))
     return _result(min(fields, key=rounded_energy), hunt.round, energies, ended)
 
 

@@ -114,7 +114,7 @@ def worse_integers(instance, z, seed):
         for _ in range(rng.integers(1, 4)):
             worse[rng.integers(len(z))] += rng.choice([-1, 1])
         yield worse
-        yield energy.descend(worse)[0]
+        yield energy.descend(worse)
 
 
 def keeps_optimum(instance, best, proof):

@@ -24,9 +24,9 @@ from ...instance.domain import Bools, Domain, Floats, Ints
 from ...instance.file import instance_arrays
 from ...instance.instance import Instance
 from ...orthogonal.energy import OrthogonalEnergy, field_of
-from ...orthogonal.search import IntegerSearch
 from ...processes.deadline import Progress
 from ...search.integer_fields import starting_integers
+from ...search.integer_search import IntegerSearch
 from ..bound.orthogonal_dual import RingDual, update_rings
 from ..checkers import check_orthogonal as checker
 from ..checkers.check_certificate import OPTIMAL
@@ -266,7 +266,7 @@ class _Prover:
     def _find_better_field(self, dual: RingDual) -> bool:
         """Whether the shares suggest a better field, which then is the best one."""
         z = self.energy.nearest(dual.decode())
-        return self._offer(self.energy.descend(z, over=self.ends.over)[0])
+        return self._offer(self.energy.descend(z, over=self.ends.over))
 
     def _search_if_due(self) -> bool:
         """Whether a search finds a better field. All of them may take as long as the levels."""
@@ -293,7 +293,7 @@ class _Prover:
     def _search(self, seconds: float) -> bool:
         """Whether a search finds a better field: whole rounds, so that it goes on where it ended."""
         clock, least = self.ends.deadline.clock, self.least
-        if self.hunt is None or self.least < self.hunt.best.total * (1 - _BETTER) - 1e-12:
+        if self.hunt is None or self.least < self.hunt.best.energy * (1 - _BETTER) - 1e-12:
             starts = [*self.starts, self.z]
             self.hunt = IntegerSearch(self.energy, self.instance.domain.rings, starts, self.seed)
         begin, last = clock(), self.hunt.round + _ROUNDS if seconds == math.inf else math.inf
@@ -303,7 +303,7 @@ class _Prover:
 
         while clock() < begin + seconds and self.hunt.round < last and not over() and not self._is_tired():
             self.hunt.explore(over)
-            self._offer(self.hunt.best.z)
+            self._offer(self.hunt.best.p)
             self.progress(f"search: energy {self.least:.5g} after {self.hunt.round} rounds")
         self.searched += clock() - begin
         return self.least < least

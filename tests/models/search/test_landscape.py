@@ -15,7 +15,7 @@ from crossfield.models.search.improvement import pixel_curves
 from crossfield.models.search.landscape import _HOLD, STEPS, Landscape, Patch
 from crossfield.models.search.search import _Hunt
 from crossfield.models.search.starts import first_field
-from crossfield.models.search.walk import Perturbations, explore
+from crossfield.models.search.walk import StrokePerturbations, explore
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from odd_instances import odd_instance
@@ -53,9 +53,9 @@ def walked(instance, seed, perturbations, steps):
     if not len(patch.pairs):
         return
     land = Landscape(patch, np.concatenate([field.alpha, field.beta]), field.p)
-    draw, rng = Perturbations(patch, pixel_curves(instance)).draw, np.random.default_rng(seed)
+    draw, rng = StrokePerturbations(patch, pixel_curves(instance)).draw, np.random.default_rng(seed)
     for _ in range(perturbations):
-        land.change(*draw(rng, land.p))
+        land.change(*draw(rng, land.offsets))
         assert_as_defined(land)
         for _ in range(steps):
             gains = land.gains()

@@ -17,7 +17,7 @@ from crossfield.models.search.greedy import greedy_field
 from crossfield.models.search.improvement import improved_field, pixel_curves
 from crossfield.models.search.landscape import STEPS, Landscape, Patch
 from crossfield.models.search.starts import first_field
-from crossfield.models.search.walk import PatchTask, Perturbations, explore
+from crossfield.models.search.walk import PatchTask, StrokePerturbations, explore
 from exhaustive import assert_feasible, exact, least_energy, random_instance, sketch
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -38,7 +38,7 @@ def landscape(field, free=None):
 
 
 def perturbations_of(patch):
-    return Perturbations(patch, pixel_curves(patch.instance))
+    return StrokePerturbations(patch, pixel_curves(patch.instance))
 
 
 def gentle(seed, spread=0):
@@ -74,7 +74,7 @@ def test_bounds_hold_after_changes():
     land = landscape(field)
     perturbations, rng = perturbations_of(land.patch), np.random.default_rng(0)
     for _ in range(30):
-        land.change(*perturbations.draw(rng, land.p))
+        land.change(*perturbations.draw(rng, land.offsets))
         beta = np.split(land.angles, 2)[1]
         assert np.abs(beta).max() < QUARTER + 1e-2
 
@@ -87,7 +87,7 @@ def test_angles_outside_the_patch_stay():
     assert land.energy == pytest.approx(field.energy().total, rel=1e-6)
     perturbations, rng = perturbations_of(land.patch), np.random.default_rng(3)
     for _ in range(5):
-        land.change(*perturbations.draw(rng, land.p))
+        land.change(*perturbations.draw(rng, land.offsets))
     outside = np.concatenate([~free, ~free])
     assert (land.angles[outside] == angles(field)[outside]).all()
     across = ~(free[grid.first] & free[grid.second])
@@ -106,7 +106,7 @@ def test_a_turn_makes_no_singularity_and_a_shift_moves_at_most_two():
     before = turns(field.instance, field.p)
     moved = set()
     for _ in range(200):
-        for change, most in ((perturbations.turn(rng), 0), (perturbations.shift(rng, field.p), 2)):
+        for change, most in ((perturbations.turn(rng), 0), (perturbations.walk(rng, land.offsets), 2)):
             pairs, steps = change
             assert len(pairs) == len(set(pairs.tolist()))
             p = field.p.copy()
