@@ -6,13 +6,14 @@ import itertools
 import math
 
 import numpy as np
+from bounded_least_squares import least_in_bounds
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.terms import parity_sign
 from crossfield.models.search.box_qp import fit_in_box
-from scipy.optimize import LinearConstraint, lsq_linear, milp
+from scipy.optimize import LinearConstraint, milp
 
 
 def sketch(mask, theta, skew_coefficient=1e-6, gauge="strokes", w=None):
@@ -117,10 +118,7 @@ def least_squares(instance):
 
 def least_in_windows(instance, p):
     """The energy of the best field with jumps p."""
-    rows, goal, weight = terms(instance, p)
-    root = np.sqrt(weight)
-    x = lsq_linear(rows * root[:, None], goal * root, windows(instance), method="bvls", tol=1e-14).x
-    return float(weight @ (rows @ x - goal) ** 2)
+    return least_in_bounds(*terms(instance, p), windows(instance))[1]
 
 
 def terms(instance, p):

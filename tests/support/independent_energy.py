@@ -12,7 +12,8 @@ from typing import Any, Final
 
 import crossfield as cf
 import numpy as np
-from scipy.optimize import LinearConstraint, linprog, lsq_linear
+from bounded_least_squares import least_in_bounds
+from scipy.optimize import LinearConstraint, linprog
 
 HALF: Final = math.pi / 2
 MOST_JUMPS: Final = 81
@@ -77,9 +78,7 @@ class Formulas:
         low, high = np.concatenate([self.lower, -skew]), np.concatenate([self.upper, skew])
         if norm == 2:
             high = np.maximum(high, low + 1e-12)  # lsq_linear takes no interval of length 0
-            root = np.sqrt(weight)
-            x = lsq_linear(rows * root[:, None], goal * root, (low, high), method="bvls", tol=1e-15).x
-            return float(weight @ (rows @ x - goal) ** 2)
+            return least_in_bounds(rows, goal, weight, (low, high))[1]
         one = np.eye(len(rows))
         both = LinearConstraint(np.vstack([np.hstack([rows, -one]), np.hstack([-rows, -one])]))
         return float(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
+from bounded_least_squares import least_in_bounds
 from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import write
@@ -20,7 +21,7 @@ from crossfield.models.instance.terms import parity_sign
 from exhaustive import every_jump, least_energy, random_instance, terms, windows
 from loops import for_each
 from meshes import box, flat_sheet, icosahedron, mesh_of, on_directions, on_edges, tetrahedron, torus
-from scipy.optimize import lsq_linear, milp
+from scipy.optimize import milp
 
 
 def on_grid(seed, shape, strokes=6):
@@ -193,11 +194,9 @@ def optimum_in_windows(instance):
     for number in np.argsort(free, kind="stable"):
         if free[number] >= least:
             return best
-        rows, goal, weight = terms(instance, jumps[number])
-        root = np.sqrt(weight)
-        x = lsq_linear(rows * root[:, None], goal * root, windows(instance), method="bvls", tol=1e-14).x
-        if weight @ (rows @ x - goal) ** 2 < least:
-            least, best = weight @ (rows @ x - goal) ** 2, (*np.split(x, 2), jumps[number])
+        x, energy = least_in_bounds(*terms(instance, jumps[number]), windows(instance))
+        if energy < least:
+            least, best = energy, (*np.split(x, 2), jumps[number])
     return best
 
 
