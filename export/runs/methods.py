@@ -13,7 +13,7 @@ from ...models.field.field import CrossField, field_in_windows
 from ...models.formulations.problem import formulate
 from ...models.instance.instance import Instance
 from ...models.orthogonal.energy import takes_integers
-from ...models.processes.deadline import Clock, Deadline, Over, Progress, never, silent
+from ...models.processes.deadline import Clock, Deadline, IsOver, Progress, never, silent
 from ...models.processes.job_counts import cores
 from ...models.processes.limits import Limits
 from ...models.search.box_qp import fit_in_box
@@ -90,7 +90,7 @@ class Request:
     limits: Limits = field(default_factory=Limits)
     start: CrossField | None = None
     progress: Progress = silent
-    stop: Over = never
+    stop: IsOver = never
     clock: Clock = time.monotonic
 
     def __post_init__(self) -> None:
@@ -101,7 +101,7 @@ class Request:
         """Return the end of the time limit, counted from now."""
         return Deadline.after(self.limits.time_limit, self.clock)
 
-    def stop_at_limit(self) -> Over:
+    def stop_at_limit(self) -> IsOver:
         """Return a function that states whether the time limit, from now on, or the caller ends the work."""
         deadline = self.deadline()
         return lambda: deadline.passed() or self.stop()
@@ -136,31 +136,31 @@ class Method:
 
 def _find_greedy(request: Request) -> Iterator[Candidate]:
     request.progress("greedy field")
-    over = request.stop_at_limit()
-    yield _time_candidate("greedy", lambda: greedy_field(request.instance, stop=over))
+    is_over = request.stop_at_limit()
+    yield _time_candidate("greedy", lambda: greedy_field(request.instance, stop=is_over))
 
 
 def _find_power(request: Request) -> Iterator[Candidate]:
     request.progress("power field")
-    over = request.stop_at_limit()
+    is_over = request.stop_at_limit()
     power = _time_candidate("power", lambda: power_field(request.instance))
     yield power
-    yield _time_candidate("power + QP", lambda: fit_in_box(power.field, over))
+    yield _time_candidate("power + QP", lambda: fit_in_box(power.field, is_over))
 
 
 def _find_polyvector(request: Request) -> Iterator[Candidate]:
     request.progress("PolyVector field")
-    over = request.stop_at_limit()
+    is_over = request.stop_at_limit()
     yield _time_candidate("polyvector", lambda: polyvector_field(request.instance))
-    if not over():
-        yield _time_candidate("polyvector + QP", lambda: polyvector_start(request.instance, over))
+    if not is_over():
+        yield _time_candidate("polyvector + QP", lambda: polyvector_start(request.instance, is_over))
 
 
 def _find_bend(request: Request) -> Iterator[Candidate]:
     request.progress("bend field")
-    over = request.stop_at_limit()
+    is_over = request.stop_at_limit()
     hard = polyvector_field(request.instance, hold=max(HOLDS))
-    yield _time_candidate("bend", lambda: bend_field(hard, stop=over))
+    yield _time_candidate("bend", lambda: bend_field(hard, stop=is_over))
 
 
 def _find_by_search(request: Request) -> Iterator[Candidate]:

@@ -12,7 +12,7 @@ from typing import Any, Final
 from ...models.errors import CrossfieldError
 from ...models.processes.child import Child, KilledError
 from ...models.processes.child_program import WorkerError
-from ...models.processes.deadline import Over, never
+from ...models.processes.deadline import IsOver, never
 from .session import OvertakenError
 from .views import load_module
 
@@ -48,7 +48,7 @@ class Desk(AbstractContextManager["Desk"]):
             self._children[kind].close()
             self._threads[kind].shutdown()
 
-    def begin(self, page: str, edit: int) -> Over:
+    def begin(self, page: str, edit: int) -> IsOver:
         """Note an edit of a page; return a function that states whether a newer one has replaced it."""
         with self._lock:
             self._newest[page] = max(edit, self._newest.pop(page, edit))
@@ -56,11 +56,13 @@ class Desk(AbstractContextManager["Desk"]):
                 self._newest.popitem(last=False)
         return lambda: self._newest.get(page, edit) != edit
 
-    def submit(self, kind: str, work: Callable[..., Any], *arguments: Any, stop: Over = never) -> Future[Any]:
+    def submit(
+        self, kind: str, work: Callable[..., Any], *arguments: Any, stop: IsOver = never
+    ) -> Future[Any]:
         """The result of work in the process of a kind. It raises OvertakenError once `stop` returns True."""
         return self._threads[kind].submit(self._call, self._children[kind], work, arguments, stop)
 
-    def _call(self, child: Child, work: Callable[..., Any], arguments: tuple[Any, ...], stop: Over) -> Any:
+    def _call(self, child: Child, work: Callable[..., Any], arguments: tuple[Any, ...], stop: IsOver) -> Any:
         if stop():
             raise OvertakenError("a newer edit replaced this one")
         try:

@@ -27,7 +27,7 @@ from starlette.types import ASGIApp, Receive, Scope, Send
 from ...models.errors import CrossfieldError, InputError, NoStrokeError, shortened
 from ...models.formulations.catalogue import list_formulations
 from ...models.input_limits import MAX_BYTES
-from ...models.processes.deadline import Over
+from ...models.processes.deadline import IsOver
 from ...models.sketch.samples import SAMPLES, sample_svg
 from ...templates import ENVIRONMENT
 from ..formats.registry import FORMATS
@@ -177,13 +177,15 @@ class Page:
             lambda: _file_response(self.desk.submit("files", download, data, *wanted).result())
         )
 
-    async def _edit(self, request: Request) -> tuple[bytes, Over]:
+    async def _edit(self, request: Request) -> tuple[bytes, IsOver]:
         data = await _body(request)
         return data, self.desk.begin(
             request.query_params.get("page", "")[:64], _parse_number(request, "edit")
         )
 
-    def _compute_views(self, data: bytes, size: int, stop: Over, *, lines: bool) -> Iterator[dict[str, Any]]:
+    def _compute_views(
+        self, data: bytes, size: int, stop: IsOver, *, lines: bool
+    ) -> Iterator[dict[str, Any]]:
         early, fine = None, Event()
         if size > _FINE:
             with suppress(NoStrokeError):  # on so coarse a grid

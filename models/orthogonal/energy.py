@@ -22,7 +22,7 @@ from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
 from ..instance.least_squares import RightAngles
 from ..instance.mesh import Mesh
-from ..processes.deadline import Over, never
+from ..processes.deadline import IsOver, never
 
 MOST_DENSE: Final = 6000
 """Points up to which the inverse of the matrix is kept: 288 MB."""
@@ -119,7 +119,7 @@ class OrthogonalEnergy(RightAngles):
         changed[rows] += HALF * steps
         return changed
 
-    def descend(self, z: Ints, over: Over = never) -> Ints:
+    def descend(self, z: Ints, is_over: IsOver = never) -> Ints:
         """Change single integers, the one of greatest gain first, until none lowers the energy.
 
         With more than 6,000 points, round all to the best angles in turn. Gains lose their digits where
@@ -128,7 +128,7 @@ class OrthogonalEnergy(RightAngles):
         """
         z, residual = z.copy(), self.residuals(self.fit_angles(z), z)
         total, failed = self.total(residual), np.zeros(len(z), dtype=bool)
-        while len(z) and self.size <= MOST_DENSE and not over():
+        while len(z) and self.size <= MOST_DENSE and not is_over():
             change = np.where(failed, 0.0, self.gains(residual))
             row = np.argmin(change, keepdims=True).astype(np.int32)
             if total + change[row[0]] >= lowered(total):
@@ -140,7 +140,7 @@ class OrthogonalEnergy(RightAngles):
             if not failed[row]:
                 z[row] += step
                 residual, total, failed[:] = moved, reached, False
-        while self.size > MOST_DENSE and not over():
+        while self.size > MOST_DENSE and not is_over():
             nearest = z - np.round(np.round(residual / HALF, 9)).astype(np.int32)
             moved = self.residuals(self.fit_angles(nearest), nearest)
             if self.total(moved) >= lowered(total):

@@ -15,7 +15,7 @@ from ..instance.cycles import grow_forest
 from ..instance.domain import Bools, Ints
 from ..instance.sparse_systems import factor_matrix
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Over, never
+from ..processes.deadline import IsOver, never
 from .energy import MOST_DENSE, OrthogonalEnergy
 
 _UPDATES: Final = 40  # of rank one between two factorisations
@@ -23,7 +23,7 @@ _SHARE: Final = 0.2  # of the open integers, rounded per factorisation where the
 
 
 @one_thread()
-def round_greedily(energy: OrthogonalEnergy, over: Over = never) -> Ints:
+def round_greedily(energy: OrthogonalEnergy, is_over: IsOver = never) -> Ints:
     """Integers by greedy rounding, (r,), one after the other with the best angles in between.
 
     With more than 6,000 points a fifth of the open integers are rounded per factorisation, those nearest to
@@ -38,7 +38,9 @@ def round_greedily(energy: OrthogonalEnergy, over: Over = never) -> Ints:
         columns, factors = np.zeros((energy.size + 1, _UPDATES)), np.zeros(_UPDATES)
         for number in range(_UPDATES):
             open_ = np.nonzero(~known)[0]
-            many = len(open_) if over() else np.ceil(_SHARE * len(open_)) if energy.size > MOST_DENSE else 1
+            many = (
+                len(open_) if is_over() else np.ceil(_SHARE * len(open_)) if energy.size > MOST_DENSE else 1
+            )
             turns = energy.turns(alpha[:-1])[open_]
             distance = np.round(np.abs(turns - np.round(turns)), 9)  # rounding errors must not decide ties
             chosen = np.argsort(distance, kind="stable")[: int(many)]

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from .child_program import StopMessage, TaskMessage, WorkerError, error_text, send
-from .deadline import Deadline, Over, never
+from .deadline import Deadline, IsOver, never
 from .process_groups import KILLED, describe_exit, kill_group, start_group
 
 GRACE: Final = 0.5
@@ -88,7 +88,7 @@ class Child(AbstractContextManager["Child"]):
         *arguments: Any,
         deadline: Deadline | None = None,
         log: Path | None = None,
-        stop: Over = never,
+        stop: IsOver = never,
     ) -> Returned:
         """Call `work(*arguments)` in the child and return its result.
 
@@ -248,7 +248,7 @@ class _Watch:
 
     deadline: Deadline
     ask: Callable[[], None]
-    stop: Over = never
+    stop: IsOver = never
     asked: int = 0
     patience: Deadline | None = None
 

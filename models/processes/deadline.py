@@ -15,7 +15,7 @@ from ..errors import InputError
 
 Clock = Callable[[], float]
 
-Over = Callable[[], bool]  # returns whether work has to end now
+IsOver = Callable[[], bool]  # returns whether work has to end now
 
 Progress = Callable[[str], None]  # receives one line that describes the current step
 
@@ -31,7 +31,7 @@ Stop = Callable[[], bool] | Event
 """A request to end work early: a function that returns whether to stop, or an event."""
 
 
-def stop_function(stop: Stop | None) -> Over:
+def stop_function(stop: Stop | None) -> IsOver:
     """A request to stop as a function; for None it never stops. Raises InputError for other values."""
     if stop is None:
         return never

@@ -19,7 +19,7 @@ from ..instance.instance import Instance
 from ..processes.child import Child, KilledError
 from ..processes.child_program import WorkerError
 from ..processes.compilation import cache_folder, crew, is_all_compiled
-from ..processes.deadline import Deadline, Over, Progress, never, silent
+from ..processes.deadline import Deadline, IsOver, Progress, never, silent
 from ..search.greedy import greedy_field
 from ..storage import temporary_folder
 from .bound import orthogonal_dual
@@ -47,7 +47,7 @@ def _compile_in(child: Child, orthogonal: bool) -> None:
         child.call(compile_all, orthogonal)
 
 
-def compile_proofs(progress: Progress, stop: Over = never, *, orthogonal: bool) -> bool:
+def compile_proofs(progress: Progress, stop: IsOver = never, *, orthogonal: bool) -> bool:
     """Compile the functions of proofs unless they are; return False where `stop` or Ctrl-C ended that.
 
     orthogonal: whether of crosses with right angles, which have proofs of their own. It takes up to half a

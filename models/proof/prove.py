@@ -112,21 +112,21 @@ def prove(
     chosen, asked = limits or Limits(math.inf, gap=0.0), stop_function(stop)
     with catch_interrupts() as interrupted, crew(chosen.threads or jobs) as threads:
 
-        def over() -> bool:
+        def is_over() -> bool:
             return interrupted() or asked()
 
         end = chosen.deadline()
         seconds = end.left()
-        compile_proofs(progress, over, orthogonal=instance.orthogonal)
+        compile_proofs(progress, is_over, orthogonal=instance.orthogonal)
         began = time.monotonic()
-        ends = Termination(Deadline.after(seconds, end.clock), over, chosen.gap, work or math.inf)
+        ends = Termination(Deadline.after(seconds, end.clock), is_over, chosen.gap, work or math.inf)
         if instance.orthogonal:
             proven, limit = prove_orthogonal(instance, start, ends, progress, seed)
             return _checked_proof(proven, lambda: check_proof(proven, limit=limit), progress)
         part = stroked_parts(instance)
         start = None if start is None else restricted(start, part)
         kind = Descent if norm == 2 else AbsoluteDescent
-        first = kind.first_field(part, norm, start, ends.over)
+        first = kind.first_field(part, norm, start, ends.is_over)
         descent = kind(norm, part, first, ends, threads, seed, jobs, progress)
         proof = descent.proof(0.0, descent.run())
     field = extended(proof.field, instance)

@@ -29,7 +29,7 @@ from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..instance.least_squares import Residuals, residuals_at
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Over, never
+from ..processes.deadline import IsOver, never
 from .box_qp import angle_bounds, field_at
 
 if TYPE_CHECKING:
@@ -199,10 +199,10 @@ def fit_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, Flo
 
 
 @one_thread()
-def alternate_absolute(field: CrossField, norm: AbsoluteNorm, over: Over = never) -> CrossField:
+def alternate_absolute(field: CrossField, norm: AbsoluteNorm, is_over: IsOver = never) -> CrossField:
     """The field after alternating best jumps and best angles, which lower its energy in that norm."""
     best, least = field, field.energy(norm).total
-    while not over():
+    while not is_over():
         jumps = best_jumps(field.instance, best.alpha, best.beta, absolute=True)
         fitted, _ = fit_absolute(CrossField(field.instance, best.alpha, best.beta, jumps), norm)
         energy = fitted.energy(norm).total

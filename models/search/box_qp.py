@@ -20,7 +20,7 @@ from ..instance.instance import Instance
 from ..instance.least_squares import Residuals, residuals_at
 from ..instance.sparse_systems import PULL, SimilarSystems
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Over, never
+from ..processes.deadline import IsOver, never
 
 CLOSE: Final = 1e-2  # relative residual of a step that ranks jumps as the exact one does
 
@@ -32,13 +32,13 @@ _MOST_HALVINGS: Final = 40
 _DECREASE: Final = 0.1  # least share of the decrease that the slope promises
 
 
-def fit_in_box(field: CrossField, over: Over = never) -> CrossField:
+def fit_in_box(field: CrossField, is_over: IsOver = never) -> CrossField:
     """The field of least 2-norm energy with the jumps of `field` in its bounds: the optimum of `qp-fixed`.
 
     Where the energy does not determine angles (parts without strokes), they stay near the given ones.
     """
     energy, x = residuals_at(field.instance, field.p), np.concatenate([field.alpha, field.beta])
-    x = minimise_in_box(energy, x, *angle_bounds(field.instance), over=over)
+    x = minimise_in_box(energy, x, *angle_bounds(field.instance), is_over=is_over)
     return field_at(field.instance, x, field.p)
 
 
@@ -73,7 +73,7 @@ def minimise_in_box(
     *,
     solver: SimilarSystems | None = None,
     tolerance: float = _SLOPE,
-    over: Over = never,
+    is_over: IsOver = never,
 ) -> Floats:
     """The point of least energy with lower <= x <= upper, shapes (2n,), searched from x.
 
@@ -86,7 +86,7 @@ def minimise_in_box(
     stiffness = energy.normal_matrix.diagonal() + PULL
     x = np.clip(x, lower, upper)
     for _ in range(_MOST_STEPS):
-        if over():
+        if is_over():
             break
         slope = energy.slope(x)
         plain = np.clip(x - slope / stiffness, lower, upper) - x
@@ -145,6 +145,6 @@ class FreeField:
         """The 2-norm energy."""
         return self.field.energy().total
 
-    def fit_in_bounds(self, over: Over = never) -> CrossField:
+    def fit_in_bounds(self, is_over: IsOver = never) -> CrossField:
         """The field of least 2-norm energy for these jumps, within the bounds of alpha, beta and p."""
-        return fit_in_box(field_in_windows(self.instance, self.alpha, self.beta, self.p), over)
+        return fit_in_box(field_in_windows(self.instance, self.alpha, self.beta, self.p), is_over)

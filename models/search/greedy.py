@@ -20,7 +20,7 @@ from ..instance.least_squares import residuals_at
 from ..instance.sparse_systems import SimilarSystems, solve_by_gradients
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Over, Progress, Stop, never, silent, stop_function
+from ..processes.deadline import IsOver, Progress, Stop, never, silent, stop_function
 from .box_qp import CLOSE, FreeField
 from .integer_fields import greedy_integer_field
 from .nearest_stroke import nearest_strokes
@@ -73,15 +73,15 @@ def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop 
         return greedy_integer_field(instance, stop_function(stop))
     state, nearest = _grow_cells(instance)
     pace = _CLOSE if instance.grid.size <= _CLOSE_UP_TO else _LARGE
-    over = stop_function(stop)
-    _stitch(state, nearest, pace, over, progress)
-    return state.fit_in_bounds(over)
+    is_over = stop_function(stop)
+    _stitch(state, nearest, pace, is_over, progress)
+    return state.fit_in_bounds(is_over)
 
 
-def rough_greedy(instance: Instance, over: Over = never) -> FreeField:
+def rough_greedy(instance: Instance, is_over: IsOver = never) -> FreeField:
     """As `greedy_field`, without bounds, in a tenth of its time: 60 batches, angles updated locally."""
     state, nearest = _grow_cells(instance)
-    _stitch(state, nearest, _ROUGH, over)
+    _stitch(state, nearest, _ROUGH, is_over)
     return state
 
 
@@ -93,7 +93,9 @@ def _grow_cells(instance: Instance) -> tuple[FreeField, Ints]:
     return FreeField(instance, angle, np.zeros(len(angle)), jumps), nearest
 
 
-def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: Progress = silent) -> None:
+def _stitch(
+    state: FreeField, nearest: Ints, pace: _Pace, is_over: IsOver, progress: Progress = silent
+) -> None:
     """Decide the jumps between cells, cheapest first, in batches."""
     grid, solver = state.instance.grid, SimilarSystems()
     known = nearest[grid.first] == nearest[grid.second]
@@ -107,7 +109,7 @@ def _stitch(state: FreeField, nearest: Ints, pace: _Pace, over: Over, progress: 
         sums = np.cumsum(cost[open_][order])
         many = max(1, int(np.searchsorted(sums, max(pace.batch, pace.share * added), side="right")))
         added += float(sums[many - 1])
-        late = over()
+        late = is_over()
         chosen = open_ if late else open_[order[:many]]
         state.p[chosen] = jumps[chosen]
         known[chosen] = True

@@ -23,7 +23,7 @@ from ..instance.sparse_systems import SimilarSystems
 from ..instance.terms import parity_sign
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Over, Stop, never, stop_function
+from ..processes.deadline import IsOver, Stop, never, stop_function
 from .box_qp import CLOSE, FreeField, minimise_in_box, stroke_bounds
 from .nearest_stroke import chamfer_distances, nearest_strokes
 
@@ -56,15 +56,17 @@ def improved_field(field: CrossField, *, stop: Stop | None = None) -> CrossField
         A field whose 2-norm energy (docs/mathematics.md, 5) does not exceed the energy of `field`.
 
     """
-    state, solver, over = FreeField.of(field), SimilarSystems(), stop_function(stop)
-    settle(state, solver, over)
+    state, solver, is_over = FreeField.of(field), SimilarSystems(), stop_function(stop)
+    settle(state, solver, is_over)
     if field.instance.gauge == "strokes" and not takes_integers(field.instance):
-        _exchange_families(state, solver, over)
-    improved = state.fit_in_bounds(over)
+        _exchange_families(state, solver, is_over)
+    improved = state.fit_in_bounds(is_over)
     return improved if improved.energy().total < field.energy().total else field
 
 
-def settle(state: FreeField, solver: SimilarSystems, over: Over = never, *, enough: float = FALL) -> None:
+def settle(
+    state: FreeField, solver: SimilarSystems, is_over: IsOver = never, *, enough: float = FALL
+) -> None:
     """Alternate solving within the bounds and choosing jumps, until a round's relative fall is below enough.
 
     Singularities move by a pixel per round, on fine grids for a hundred rounds.
@@ -72,10 +74,12 @@ def settle(state: FreeField, solver: SimilarSystems, over: Over = never, *, enou
     bounds = stroke_bounds(state.instance)
     lowest, least = (state.x, state.p), np.inf
     for _ in range(_ROUNDS):
-        if over():
+        if is_over():
             break
         energy = residuals_at(state.instance, state.p)
-        state.x = minimise_in_box(energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, over=over)
+        state.x = minimise_in_box(
+            energy, state.x, *bounds, solver=solver, tolerance=_SETTLED, is_over=is_over
+        )
         reached = state.energy
         fall = (least - reached) / (1 + reached)
         if fall >= FALL:
@@ -100,7 +104,7 @@ def _swap_lines(state: FreeField) -> None:
     state.alpha, state.beta = alpha, beta
 
 
-def _exchange_families(state: FreeField, solver: SimilarSystems, over: Over) -> None:
+def _exchange_families(state: FreeField, solver: SimilarSystems, is_over: IsOver) -> None:
     """Let curves change their family of lines where that lowers the energy, the worst first."""
     instance, grid = state.instance, state.instance.grid
     curve = stroke_curves(instance)
@@ -108,20 +112,20 @@ def _exchange_families(state: FreeField, solver: SimilarSystems, over: Over) -> 
     worst = np.argsort(-np.round(np.bincount(curve, miss), 9), kind="stable")[:_MOST_CURVES]
     of_pixel = np.append(curve, -1)[nearest_strokes(instance)]
     for number in worst:
-        if over():
+        if is_over():
             return
         quarters = (of_pixel == number).astype(np.int32)
         if (quarters[grid.first] != quarters[grid.second]).any():
-            _turn_if_better(state, quarters, solver, over)
+            _turn_if_better(state, quarters, solver, is_over)
 
 
-def _turn_if_better(state: FreeField, curve_quarters: Ints, solver: SimilarSystems, over: Over) -> None:
+def _turn_if_better(state: FreeField, curve_quarters: Ints, solver: SimilarSystems, is_over: IsOver) -> None:
     """Turn the crosses round a curve (own = 1) by a quarter either way, and keep the largest decrease."""
     enough = state.energy * (1 - 1e-6) - 1e-9
     trials = [_turn_trial(state, quarters, solver) for quarters in (curve_quarters, -curve_quarters)]
     best = min(trials, key=lambda trial: round(trial.energy, 9))
     if best.energy < enough:
-        settle(best, solver, over)
+        settle(best, solver, is_over)
         if best.energy < enough:
             state.x, state.p = best.x, best.p
 

@@ -12,36 +12,36 @@ from ..instance.instance import Instance
 from ..instance.sparse_systems import SimilarSystems
 from ..orthogonal.energy import MOST_DENSE, OrthogonalEnergy, field_of, integers_of
 from ..orthogonal.greedy import round_greedily
-from ..processes.deadline import Over
+from ..processes.deadline import IsOver
 from ..smooth.polyvector import power_field
 from .box_qp import FreeField, fit_in_box
 from .improvement import settle
 
 
-def greedy_integer_field(instance: Instance, over: Over) -> CrossField:
+def greedy_integer_field(instance: Instance, is_over: IsOver) -> CrossField:
     """The field of greedy rounding."""
     energy = OrthogonalEnergy.of(instance)
-    return finish_field(instance, energy, round_greedily(energy, over), over)
+    return finish_field(instance, energy, round_greedily(energy, is_over), is_over)
 
 
-def first_integer_field(instance: Instance, over: Over) -> CrossField:
+def first_integer_field(instance: Instance, is_over: IsOver) -> CrossField:
     """The lower of the greedy and the power field after descent; of over 6,000 points, the power field."""
     energy = OrthogonalEnergy.of(instance)
     if energy.size > MOST_DENSE:
         z = energy.nearest(power_field(instance).alpha)
     else:
-        z = min(starting_integers(instance, energy, None, over), key=energy.least_total)
-    return finish_field(instance, energy, z, over)
+        z = min(starting_integers(instance, energy, None, is_over), key=energy.least_total)
+    return finish_field(instance, energy, z, is_over)
 
 
 def starting_integers(
-    instance: Instance, energy: OrthogonalEnergy, start: CrossField | None, over: Over
+    instance: Instance, energy: OrthogonalEnergy, start: CrossField | None, is_over: IsOver
 ) -> list[Ints]:
     """Integers of the power field, the greedy field and a given one, after descent."""
-    starts = [energy.nearest(power_field(instance).alpha), round_greedily(energy, over)]
+    starts = [energy.nearest(power_field(instance).alpha), round_greedily(energy, is_over)]
     if start is not None:
         starts.append(integers_of(start))
-    return [energy.descend(z, over) for z in starts]
+    return [energy.descend(z, is_over) for z in starts]
 
 
 def have_energies_of_fields(instance: Instance) -> bool:
@@ -49,13 +49,13 @@ def have_energies_of_fields(instance: Instance) -> bool:
     return instance.orthogonal and instance.gauge == "strokes"
 
 
-def finish_field(instance: Instance, energy: OrthogonalEnergy, z: Ints, over: Over) -> CrossField:
+def finish_field(instance: Instance, energy: OrthogonalEnergy, z: Ints, is_over: IsOver) -> CrossField:
     """The field of integers z (r,) in the windows; where beta is free or windows bind, best angles and jumps
     in turn.
     """
     field = field_of(instance, z, energy)
     if have_energies_of_fields(instance):
-        return fit_in_box(field, over)
+        return fit_in_box(field, is_over)
     state = FreeField.of(field)
-    settle(state, SimilarSystems(), over)
-    return state.fit_in_bounds(over)
+    settle(state, SimilarSystems(), is_over)
+    return state.fit_in_bounds(is_over)

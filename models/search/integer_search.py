@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from ..instance.angles import HALF
 from ..instance.domain import Ints, Rings
 from ..orthogonal.energy import MOST_DENSE, OrthogonalEnergy, lowered
-from ..processes.deadline import Over
+from ..processes.deadline import IsOver
 from .landscape import IntegerLandscape
 from .perturbations import Perturbations
 from .walk import explore_from
@@ -34,28 +34,28 @@ class IntegerSearch:
         self.best = self._present = self._starts.pop()
         self.round = self.fruitless = self._tired = 0
 
-    def explore(self, over: Over) -> None:
+    def explore(self, is_over: IsOver) -> None:
         """Try 500 perturbations, with more than 6,000 points within 1,500 of them; return early if over."""
         rng = np.random.default_rng((self._seed, self.round))
         if self._energy.size > MOST_DENSE:
-            land = self._explore_patch(rng, over)
+            land = self._explore_patch(rng, is_over)
         else:
             if self._tired > _TIRED * self._energy.size:
-                self._present, self._tired = self._begin_again(rng, over), 0
-            land = _explore(self._present, self._rings, rng, over)
+                self._present, self._tired = self._begin_again(rng, is_over), 0
+            land = _explore(self._present, self._rings, rng, is_over)
         self._tired = 0 if land.energy < lowered(self._present.energy) else self._tired + _KICKS
         self.fruitless = 0 if land.energy < lowered(self.best.energy) else self.fruitless + _KICKS
         self._present = land
         self.best = self.best if self.fruitless else land
-        self.round += not over()
+        self.round += not is_over()
 
-    def _begin_again(self, rng: np.random.Generator, over: Over) -> IntegerLandscape:
+    def _begin_again(self, rng: np.random.Generator, is_over: IsOver) -> IntegerLandscape:
         if self._starts:
             return self._starts.pop()
         z = self._energy.nearest(rng.uniform(0, HALF, self._energy.size))
-        return IntegerLandscape(self._energy, self._energy.descend(z, over))
+        return IntegerLandscape(self._energy, self._energy.descend(z, is_over))
 
-    def _explore_patch(self, rng: np.random.Generator, over: Over) -> IntegerLandscape:
+    def _explore_patch(self, rng: np.random.Generator, is_over: IsOver) -> IntegerLandscape:
         """Explore the points nearest to a row, alternately a random one and one of high energy."""
         energy, (z, residual, total) = self._energy, self._present.save_state()
         if not len(z):
@@ -67,13 +67,15 @@ class IntegerSearch:
         inside = np.maximum(patch.first, patch.second) < patch.size
         local = np.full(len(z), -1, dtype=np.int32)
         local[rows[inside]] = np.nonzero(inside)[0]
-        z[rows] = _explore(IntegerLandscape(patch, z[rows]), self._rings.select(local), rng, over).p
+        z[rows] = _explore(IntegerLandscape(patch, z[rows]), self._rings.select(local), rng, is_over).p
         return IntegerLandscape(energy, z)
 
 
-def _explore(land: IntegerLandscape, rings: Rings, rng: np.random.Generator, over: Over) -> IntegerLandscape:
+def _explore(
+    land: IntegerLandscape, rings: Rings, rng: np.random.Generator, is_over: IsOver
+) -> IntegerLandscape:
     """The lowest landscape of 500 perturbations; rings: of the rows."""
     if not len(land.p):
         return land
     perturbations = Perturbations(rings, land.terms.size, land.terms.first, land.terms.second)
-    return explore_from(land, perturbations, rng, least=land.energy, count=_KICKS, over=over)[0] or land
+    return explore_from(land, perturbations, rng, least=land.energy, count=_KICKS, is_over=is_over)[0] or land

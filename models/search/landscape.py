@@ -1,8 +1,8 @@
 """The least energy as a function of the jumps, and its change for each single change of a jump.
 
 For given jumps the least energy over the angles is E(p) = c - b'Gb with G the inverse of H
-(models/search/energy.py). On a patch of some hundred pixels G is a small dense matrix. A jump p_e of the
-pair (i, j) of weight w that changes by d
+(models/instance/least_squares.py). On a patch of some hundred pixels G is a small dense matrix. A jump p_e
+of the pair (i, j) of weight w that changes by d
 
 - moves A_e by q = d pi/2: with r = e_i - e_j on alpha, b changes by -2 w q r;
 - if d is odd, turns the sign of the coupling of beta_i and beta_j: H changes in two entries by 4 w (-1)^p,

@@ -21,7 +21,7 @@ from ..instance.instance import Instance
 from ..instance.sparse_systems import SimilarSystems
 from ..orthogonal.energy import OrthogonalEnergy, lowered, takes_integers
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Deadline, Over, Progress, Stop, never, silent, stop_function
+from ..processes.deadline import Deadline, IsOver, Progress, Stop, never, silent, stop_function
 from ..processes.job_counts import check_jobs
 from ..processes.limits import Limits
 from ..processes.process_groups import catch_interrupts
@@ -144,7 +144,9 @@ def search(
         if takes_integers(instance):
             return _search_integers(instance, seed, start, ends, progress)
         part = stroked_parts(instance)  # the others are constant and cost nothing
-        starts = start_fields(instance, start, ends.over, polyvector_start, lambda one, _: power_field(one))
+        starts = start_fields(
+            instance, start, ends.is_over, polyvector_start, lambda one, _: power_field(one)
+        )
         hunt = _Hunt(part, seed, [restricted(field, part) for field in starts])
         alone = part.grid.size <= _ALONE or deadline.left() < _HURRY
         try:
@@ -159,7 +161,11 @@ def _search_integers(
     instance: Instance, seed: int, start: CrossField | None, ends: _Ends, progress: Progress
 ) -> Search:
     """Search over the integers of orthogonal crosses, from the power field, the greedy field and `start`."""
-    closing, energy, sooner = _closing_limit(ends.deadline), OrthogonalEnergy.of(instance), ends.sooner().over
+    closing, energy, sooner = (
+        _closing_limit(ends.deadline),
+        OrthogonalEnergy.of(instance),
+        ends.sooner().is_over,
+    )
     starts = starting_integers(instance, energy, start, sooner)
     hunt = IntegerSearch(energy, instance.domain.rings, starts, seed)
     fields, is_exact = [start] if start else [], have_energies_of_fields(instance)
@@ -171,7 +177,7 @@ def _search_integers(
         if hunt.fruitless > _PATIENCE * energy.size:
             ended = "patience"
             break
-        hunt.explore(ends.over)
+        hunt.explore(ends.is_over)
         if is_exact and hunt.best.energy < energies[-1][1]:
             energies.append((hunt.round, hunt.best.energy))
         progress(f"{kind} {hunt.best.energy:.5g} after {hunt.round} rounds")
@@ -186,7 +192,7 @@ def _result(field: CrossField, rounds: int, energies: list[tuple[int, float]], e
     return Search(field, rounds, tuple(energies), ended)
 
 
-def _closing_limit(deadline: Deadline) -> Callable[[], Over]:
+def _closing_limit(deadline: Deadline) -> Callable[[], IsOver]:
     """End of the last solve, counted from the end of the search, or from a deadline before that."""
     share, more = _CLOSING
     seconds = share * deadline.left() + more
@@ -213,7 +219,7 @@ class _Ends:
         """The limits of starts, which leave half of the time."""
         return replace(self, deadline=self.deadline.share(0.5))
 
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether work has to end now, even in the middle of a round."""
         return self.interrupted() or self.deadline.passed()
 
@@ -236,10 +242,10 @@ class _Hunt:
         self._unsettled = False
         self._curve = pixel_curves(instance)
 
-    def best(self, over: Over) -> CrossField:
+    def best(self, is_over: IsOver) -> CrossField:
         """The field of least energy so far."""
-        self._settle(over)
-        return min(self._state.fit_in_bounds(over), self._start, key=rounded_energy)
+        self._settle(is_over)
+        return min(self._state.fit_in_bounds(is_over), self._start, key=rounded_energy)
 
     @property
     def is_large(self) -> bool:
@@ -258,8 +264,8 @@ class _Hunt:
                 return "patience"
             tasks = self.tasks(ends.deadline)
             results = explorers(tasks)
-            self._adopt_results(tasks, [result.better for result in results], ends.over)
-            if all(result.complete for result in results) and not ends.over():
+            self._adopt_results(tasks, [result.better for result in results], ends.is_over)
+            if all(result.complete for result in results) and not ends.is_over():
                 self.round += 1
             progress(f"energy {self.energies[-1][1]:.5g} after {self.round} rounds")
         return ended
@@ -293,7 +299,9 @@ class _Hunt:
             away = (grid.rows - grid.rows[centre]) ** 2 + (grid.columns - grid.columns[centre]) ** 2
             yield away <= np.partition(away, _PATCH)[_PATCH]
 
-    def _adopt_results(self, tasks: list[PatchTask], points: list[FieldPoint | None], over: Over) -> None:
+    def _adopt_results(
+        self, tasks: list[PatchTask], points: list[FieldPoint | None], is_over: IsOver
+    ) -> None:
         """Adopt lower points, the lowest first, and update the whole grid now and then."""
         self.fruitless += _KICKS * len(tasks)
         if self._explores_starts:
@@ -301,9 +309,9 @@ class _Hunt:
         else:
             lower = [(task, better) for task, better in zip(tasks, points, strict=True) if better is not None]
             for task, better in sorted(lower, key=lambda pair: pair[1].energy):
-                self._adopt(task, better, over)
+                self._adopt(task, better, is_over)
         if self._unsettled and ((self.round + 1) % _SETTLE == 0 or not self.is_large):
-            self._settle(over)
+            self._settle(is_over)
 
     def _adopt_in_starts(self, points: list[FieldPoint | None]) -> None:
         """Adopt lower points in the fields that were explored, and the lowest of these."""
@@ -316,7 +324,7 @@ class _Hunt:
             self._unsettled, self.fruitless = True, 0
             self.energies.append((self.round, best.energy))
 
-    def _adopt(self, task: PatchTask, better: FieldPoint, over: Over) -> None:
+    def _adopt(self, task: PatchTask, better: FieldPoint, is_over: IsOver) -> None:
         """Adopt a patch's angles and jumps if they lower the energy together with other adopted patches."""
         state = self._state
         trial = FreeField(
@@ -327,14 +335,14 @@ class _Hunt:
         if not self.is_large and trial.energy >= below(state.energy):
             # Other patches were adopted in the same place: the angles for all new jumps are neither's.
             trial.x = state.x
-            settle(trial, self._solver, over)
+            settle(trial, self._solver, is_over)
         if trial.energy < below(state.energy):
             self._state, self._unsettled, self.fruitless = trial, True, 0
             self.energies.append((self.round, trial.energy))
 
-    def _settle(self, over: Over) -> None:
+    def _settle(self, is_over: IsOver) -> None:
         """Update angles and jumps of the whole grid."""
         if self._unsettled:
-            settle(self._state, self._solver, over)
+            settle(self._state, self._solver, is_over)
             self._unsettled = False
             self.energies.append((self.round, self._state.energy))

@@ -22,7 +22,7 @@ from ..instance.least_squares import residuals_at
 from ..instance.sparse_systems import SimilarSystems, solve_by_gradients
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Over, never
+from ..processes.deadline import IsOver, never
 from ..smooth.polyvector import HOLDS, polyvector_field
 from .box_qp import FreeField, fit_in_box, stroke_bounds
 from .coarse_grid import copy_to_fine_grid, halve_resolution
@@ -30,7 +30,7 @@ from .greedy import greedy_field, rough_greedy
 from .improvement import improved_field, settle
 from .integer_fields import first_integer_field
 
-_Strategy = Callable[[Instance, Over], FreeField]
+_Strategy = Callable[[Instance, IsOver], FreeField]
 
 _SMALL: Final = 1024  # pixels up to which the greedy strategy costs little
 _EFFORT: Final = 32768  # pixels of all approximate fields of one grid
@@ -42,7 +42,7 @@ _FAINT: Final = 1e-2  # of the polynomials of an approximate field, whose values
 
 
 @one_thread()
-def first_field(instance: Instance, over: Over = never) -> CrossField:
+def first_field(instance: Instance, is_over: IsOver = never) -> CrossField:
     """A field of low 2-norm energy within the time.
 
     Up to 1024 pixels it is the improved greedy field. On larger grids it fuses fast approximate fields of up
@@ -50,51 +50,51 @@ def first_field(instance: Instance, over: Over = never) -> CrossField:
     Orthogonal crosses and meshes: see `first_integer_field`.
     """
     if takes_integers(instance):
-        return first_integer_field(instance, over)
+        return first_integer_field(instance, is_over)
     if instance.grid.size <= _SMALL:
-        return improved_field(greedy_field(instance, stop=over), stop=over)
-    return _fuse_many(instance, over)[0].fit_in_bounds(over)
+        return improved_field(greedy_field(instance, stop=is_over), stop=is_over)
+    return _fuse_many(instance, is_over)[0].fit_in_bounds(is_over)
 
 
 def start_fields(
     instance: Instance,
     start: CrossField | None,
-    over: Over,
-    *strategies: Callable[[Instance, Over], CrossField],
+    is_over: IsOver,
+    *strategies: Callable[[Instance, IsOver], CrossField],
 ) -> list[CrossField]:
     """The first field, the given one and, in time, the others, each improved.
 
     The lowest comes first, and of fields of equal energy only the first one is returned.
     """
-    fields = [first_field(instance, over)]
+    fields = [first_field(instance, is_over)]
     if start is not None:
-        fields.append(improved_field(start, stop=over))
+        fields.append(improved_field(start, stop=is_over))
     fields.extend(
-        improved_field(strategy(instance, over), stop=over) for strategy in strategies if not over()
+        improved_field(strategy(instance, is_over), stop=is_over) for strategy in strategies if not is_over()
     )
     by_energy = {rounded_energy(field): field for field in reversed(fields)}
     return [by_energy[energy] for energy in sorted(by_energy)]
 
 
 @one_thread()
-def polyvector_start(instance: Instance, over: Over = never) -> CrossField:
+def polyvector_start(instance: Instance, is_over: IsOver = never) -> CrossField:
     """The field of least 2-norm energy among the PolyVector fields of all `HOLDS`, with their best angles."""
-    best = fit_in_box(polyvector_field(instance, hold=HOLDS[0]), over)
+    best = fit_in_box(polyvector_field(instance, hold=HOLDS[0]), is_over)
     for hold in HOLDS[1:]:
-        if over():
+        if is_over():
             break
-        tried = fit_in_box(polyvector_field(instance, hold=hold), over)
+        tried = fit_in_box(polyvector_field(instance, hold=hold), is_over)
         best = min(best, tried, key=rounded_energy)
     return best
 
 
-def _polyvector_state(hold: float, instance: Instance, _: Over) -> FreeField:
+def _polyvector_state(hold: float, instance: Instance, _: IsOver) -> FreeField:
     return FreeField.of(polyvector_field(instance, hold=hold, tolerance=_FAINT))
 
 
-def _greedy_state(hold: float, instance: Instance, over: Over) -> FreeField:
+def _greedy_state(hold: float, instance: Instance, is_over: IsOver) -> FreeField:
     """The greedy field of a hold: with a smaller hold, contradictory strokes make fewer vortices."""
-    light = rough_greedy(replace(instance, stroke_coefficient=hold * instance.stroke_coefficient), over)
+    light = rough_greedy(replace(instance, stroke_coefficient=hold * instance.stroke_coefficient), is_over)
     return FreeField(instance, light.alpha, light.beta, light.p)
 
 
@@ -113,23 +113,23 @@ _STRATEGIES: Final[tuple[_Strategy, ...]] = (
 """Pairs of a strategy and a factor of the stroke weights, in the order of their additional benefit."""
 
 
-def _fuse_many(instance: Instance, over: Over) -> list[FreeField]:
+def _fuse_many(instance: Instance, is_over: IsOver) -> list[FreeField]:
     """The fusion of approximate fields, then these fields: from strategies here and on coarser grids."""
     starts: list[FreeField] = []
     coarse = halve_resolution(instance) if instance.grid.size > _SMALL else None
     if coarse is not None:
-        for state in _fuse_many(coarse, over)[:_LIFTED]:
-            if starts and over():
+        for state in _fuse_many(coarse, is_over)[:_LIFTED]:
+            if starts and is_over():
                 break
             starts.append(copy_to_fine_grid(state.field, instance))
             _settle_roughly(starts[-1])
     for strategy in _STRATEGIES[: max(1, _EFFORT // instance.grid.size)]:
-        if starts and over():
+        if starts and is_over():
             break
-        starts.append(strategy(instance, over))
+        starts.append(strategy(instance, is_over))
         _settle_roughly(starts[-1])
     starts.sort(key=_state_energy)
-    return [_fuse_states(starts, over), *starts]
+    return [_fuse_states(starts, is_over), *starts]
 
 
 def _settle_roughly(state: FreeField) -> None:
@@ -142,15 +142,15 @@ def _settle_roughly(state: FreeField) -> None:
         state.p = free_jumps(state.instance, state.alpha, state.beta)[0]
 
 
-def _fuse_states(states: list[FreeField], over: Over) -> FreeField:
+def _fuse_states(states: list[FreeField], is_over: IsOver) -> FreeField:
     """The first and lowest field, settled, with the regions of others that lower it."""
     best = states[0].field
     for candidate in states[1:]:
-        if over():
+        if is_over():
             break
         best = fuse_fields(best, candidate.field)
     state = FreeField.of(best)
-    settle(state, SimilarSystems(), over, enough=_CREEP)
+    settle(state, SimilarSystems(), is_over, enough=_CREEP)
     return min(state, states[0], key=_state_energy)
 
 

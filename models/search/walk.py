@@ -20,7 +20,7 @@ from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from ..orthogonal.energy import lowered
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Deadline, Over
+from ..processes.deadline import Deadline, IsOver
 from .box_qp import field_at
 from .landscape import FieldPoint, IntegerLandscape, Landscape, Patch
 from .perturbations import Change, Perturbations
@@ -71,11 +71,11 @@ def explore(task: PatchTask) -> PatchResult:
     return PatchResult(None, complete=True)
 
 
-def _explore(task: PatchTask, over: Over) -> PatchResult:
+def _explore(task: PatchTask, is_over: IsOver) -> PatchResult:
     patch = Patch.of(task.instance, task.free)
     land = Landscape(patch, task.x, task.p)
     if not len(patch.pairs):
-        return PatchResult(None, complete=not over())
+        return PatchResult(None, complete=not is_over())
     # Solved in the patch alone, the angles may be lower already; jumps have to improve on that.
     least = min(field_at(task.instance, task.x, task.p).energy().total, land.point.energy)
     turning = np.random.default_rng((*task.seed, 1)) if len(patch.strokes) else None
@@ -85,7 +85,7 @@ def _explore(task: PatchTask, over: Over) -> PatchResult:
         np.random.default_rng(task.seed),
         least=least,
         count=task.perturbations,
-        over=over,
+        is_over=is_over,
         turning=turning,
     )
     return PatchResult(None if lower is None else lower.point, complete)
@@ -98,7 +98,7 @@ def explore_from(
     *,
     least: float,
     count: int,
-    over: Over,
+    is_over: IsOver,
     turning: np.random.Generator | None = None,
 ) -> tuple[Land | None, bool]:
     """The landscape at the lowest point of walks from perturbations of the lowest one; None if none is lower.
@@ -108,26 +108,28 @@ def explore_from(
     """
     home, best = land.save_state(), None
     for number in range(count):
-        walks: list[Callable[[Any, float, Over], Ints | None]]
+        walks: list[Callable[[Any, float, IsOver], Ints | None]]
         walks = [partial(_walk_from, perturbations.draw(rng, land.offsets), rng)]
         if turning is not None and number % _PLAIN == 0:
             walks.append(partial(_walk_of_turns, turning))
         for walk in walks:
-            lower = _lower_landscape(land, walk, over)
+            lower = _lower_landscape(land, walk, is_over)
             if lower is not None and lower.bounded_energy < below(least):
                 land = best = lower
                 home, least = lower.save_state(), lower.bounded_energy
-            elif over():
+            elif is_over():
                 return best, False
             else:
                 land.restore(home)
-    return best, not over()
+    return best, not is_over()
 
 
-def _lower_landscape(land: Land, walk: Callable[[Land, float, Over], Ints | None], over: Over) -> Land | None:
+def _lower_landscape(
+    land: Land, walk: Callable[[Land, float, IsOver], Ints | None], is_over: IsOver
+) -> Land | None:
     """The landscape at the lowest point of a walk; None if it finds no lower one."""
     with suppress(np.linalg.LinAlgError):
-        jumps = walk(land, below(land.energy), over)
+        jumps = walk(land, below(land.energy), is_over)
         # Computed anew, because rounding of many updates must not accumulate.
         return None if jumps is None else land.at(jumps)
     return None
@@ -138,18 +140,18 @@ def _walk_from(
     rng: np.random.Generator,
     land: Landscape | IntegerLandscape,
     goal: float,
-    over: Over,
+    is_over: IsOver,
 ) -> Ints | None:
     """A walk that changes jumps after a perturbation."""
     land.change(*perturbation)
-    return _walk(land, _Moves(land.gains, land.step, land.patience), rng, goal, over)
+    return _walk(land, _Moves(land.gains, land.step, land.patience), rng, goal, is_over)
 
 
-def _walk_of_turns(rng: np.random.Generator, land: Landscape, goal: float, over: Over) -> Ints | None:
+def _walk_of_turns(rng: np.random.Generator, land: Landscape, goal: float, is_over: IsOver) -> Ints | None:
     """A walk that turns strokes, the first one at random."""
     land.turn(int(rng.integers(len(land.patch.strokes))))
     turns = _Moves(lambda: land.turn_gains()[None], lambda _, stroke: land.turn(stroke), _FRUITLESS_TURNS)
-    return _walk(land, turns, rng, goal, over)
+    return _walk(land, turns, rng, goal, is_over)
 
 
 class _Moves(NamedTuple):
@@ -161,7 +163,7 @@ class _Moves(NamedTuple):
 
 
 def _walk(
-    land: Landscape | IntegerLandscape, moves: _Moves, rng: np.random.Generator, goal: float, over: Over
+    land: Landscape | IntegerLandscape, moves: _Moves, rng: np.random.Generator, goal: float, is_over: IsOver
 ) -> Ints | None:
     """The jumps of the lowest point below `goal` of a walk from the landscape's present state."""
     low, jumps, fruitless, rest_until = land.energy, None, 0, dict[int, int]()
@@ -174,7 +176,7 @@ def _walk(
             gains[:, [place for place, end in rest_until.items() if end >= now]] = np.inf
             best = int(np.argmin(gains))
         row, place = divmod(best, gains.shape[1])
-        if np.isinf(gains[row, place]) or over():
+        if np.isinf(gains[row, place]) or is_over():
             break
         moves.make(row, place)
         rest_until[place] = now + int(rng.integers(*_REST))

@@ -24,7 +24,7 @@ from ..instance.grid import Grid
 from ..instance.least_squares import Residuals, two_entry_matrix
 from ..instance.sparse_systems import Solve, solve_by_gradients
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Over, Stop, stop_function
+from ..processes.deadline import IsOver, Stop, stop_function
 from .two_levels import approximate_inverse
 
 _Places = NDArray[np.intp]
@@ -94,17 +94,17 @@ def bend_field(
     check_positive("hold", hold)
     if harmonic is not None:
         check_positive("harmonic", harmonic)
-    over = stop_function(stop)
-    if over():
+    is_over = stop_function(stop)
+    if is_over():
         return start
     x = np.concatenate([start.u_angle, start.v_angle])
     bend = _Bend.of(start, HARMONIC if harmonic is None else harmonic, hold)
     inverse = bend.invert(x)
     if harmonic is None:
-        x = bend.least(x, inverse, over, _ROUGH)
+        x = bend.least(x, inverse, is_over, _ROUGH)
         trembling = tremble(CrossField.from_lines(start.instance, *np.split(x, 2))) / TREMBLE
         bend = _Bend.of(start, HARMONIC * float(np.clip(trembling**2, _LEAST, 1.0)), hold)
-    x = bend.least(x, inverse, over, _FALL)
+    x = bend.least(x, inverse, is_over, _FALL)
     return CrossField.from_lines(start.instance, *np.split(x, 2))
 
 
@@ -149,11 +149,11 @@ class _Bend:
         linear = Residuals.join([even, _stroke_residuals(start, hold), skew])
         return cls(start.instance.grid, links, differences, *_quadrants(start), linear)
 
-    def least(self, x: Floats, inverse: Solve, over: Over, fall: float) -> Floats:
+    def least(self, x: Floats, inverse: Solve, is_over: IsOver, fall: float) -> Floats:
         """Angles of low energy, in rounds that begin at x and end with one that removes less than `fall`."""
         energy, slope, along = self.at(x)
         for number in range(_ROUNDS):
-            if over():
+            if is_over():
                 break
             moved = x - self._step(along, slope, inverse, _RESIDUAL if number else _FIRST)
             there = self.at(moved)

@@ -14,7 +14,7 @@ from scipy import sparse
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.least_squares import Residuals
 from ..instance.sparse_systems import SimilarSystems
-from ..processes.deadline import Over
+from ..processes.deadline import IsOver
 from .stencils import SLOPES, Crosses, Stencils, scale_rows
 
 CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
@@ -224,12 +224,12 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
     return changes
 
 
-def descend(equations: Equations, z: Floats, over: Over) -> tuple[float, Floats]:
+def descend(equations: Equations, z: Floats, is_over: IsOver) -> tuple[float, Floats]:
     """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
     energy, damping = equations.energy(z), _DAMPING
     solver = SimilarSystems(equations.stencils.order, steps=_STEPS, few=_FEW)
     for _ in range(_ROUNDS):
-        if over():
+        if is_over():
             break
         slope, curvature = equations.model(z)
         diagonal = sparse.diags_array(curvature.diagonal())

@@ -15,7 +15,7 @@ from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.grid import Grid
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import Over, Progress, Stop, silent, stop_function
+from ..processes.deadline import IsOver, Progress, Stop, silent, stop_function
 from .equations import FORGIVEN, Equations, Weights, descend, normals_of
 from .hints import Hint, check_hints, hint_rows
 from .stencils import Crosses, GridLevel, Stencils, levels_of
@@ -105,35 +105,35 @@ def surface(
 class TimeLimit:
     """A time limit that remembers whether it was ever over."""
 
-    over: Over
+    is_over: IsOver
     off: bool = False
 
     def __call__(self) -> bool:
         """Whether time is over."""
-        self.off = self.off or self.over()
+        self.off = self.off or self.is_over()
         return self.off
 
 
-def _solve_part(part: GridLevel, hints: Sequence[Hint], over: Over, *, flip: bool) -> Floats:
+def _solve_part(part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool) -> Floats:
     """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
     coarse, *finer = levels_of(part)
-    dome, *planes = ([*_from_start(coarse, z, hints, over, flip=flip)] for z in coarse.initial_heights)
+    dome, *planes = ([*_from_start(coarse, z, hints, is_over, flip=flip)] for z in coarse.initial_heights)
     candidates = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
     _, z = min(candidates, key=itemgetter(0))
     for level in finer:
-        z = _descend_with_hints(level, level.interpolate(coarse, z), hints, over)[1]
+        z = _descend_with_hints(level, level.interpolate(coarse, z), hints, is_over)[1]
         coarse = level
     return z if hints else _orient(part, z, flip=flip)
 
 
 def _from_start(
-    level: GridLevel, z: Floats, hints: Sequence[Hint], over: Over, *, flip: bool
+    level: GridLevel, z: Floats, hints: Sequence[Hint], is_over: IsOver, *, flip: bool
 ) -> Iterator[tuple[float, Floats]]:
     """Energies and heights reached from a start, with hints from the possible sides."""
-    _, z = descend(Equations(level.stencils, level.crosses, FIRST), z, over)
+    _, z = descend(Equations(level.stencils, level.crosses, FIRST), z, is_over)
     z = _orient(level, z, flip=flip)
     for side in (z, -z) if _decide_side(hints) else (z,):
-        yield _descend_with_hints(level, side, hints, over)
+        yield _descend_with_hints(level, side, hints, is_over)
 
 
 def _decide_side(hints: Sequence[Hint]) -> bool:
@@ -142,11 +142,11 @@ def _decide_side(hints: Sequence[Hint]) -> bool:
 
 
 def _descend_with_hints(
-    level: GridLevel, z: Floats, hints: Sequence[Hint], over: Over
+    level: GridLevel, z: Floats, hints: Sequence[Hint], is_over: IsOver
 ) -> tuple[float, Floats]:
     """The energy and heights reached from z by descent, with the hints."""
     extra = [hint_rows(hint, level) for hint in hints]
-    return descend(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, over)
+    return descend(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, is_over)
 
 
 def _orient(level: GridLevel, z: Floats, *, flip: bool) -> Floats:

@@ -62,7 +62,7 @@ def test_one_word_has_one_meaning_and_options_are_keywords():
         for number, parameter in enumerate(inspect.signature(thing).parameters.values()):
             if parameter.name in WORDS and parameter.annotation not in WORDS[parameter.name]:
                 faults.append((name, parameter.name, parameter.annotation))
-            if parameter.name in {"seconds", "time_limit", "gap", "threads", "over", "deadline"}:
+            if parameter.name in {"seconds", "time_limit", "gap", "threads", "is_over", "deadline"}:
                 faults.append((name, parameter.name))
             is_keyword = parameter.kind in {parameter.KEYWORD_ONLY, parameter.VAR_KEYWORD}
             optional = number > 0 and parameter.default is not parameter.empty

@@ -92,10 +92,10 @@ class Watch:
         beside = max(0.0, busy_seconds(self.core) - self._busy - (everything - self._all))
         wall = time.monotonic() - self.began
         facts: Row = {"cpu": own - self._own, "wall": wall, "beside": beside}
-        repeated = beside > self.slack + SHARE * wall or self.over()
+        repeated = beside > self.slack + SHARE * wall or self.is_over()
         return facts | ({"status": DISCARDED} if repeated else {})
 
-    def over(self) -> bool:
+    def is_over(self) -> bool:
         """Whether the study ends."""
         return time.monotonic() > self.end
 
@@ -103,7 +103,7 @@ class Watch:
         """Whether the study ends, or other work disturbs the run; looks once a second after the first two."""
         now = time.monotonic()
         if now < max(self.seen + 1, self.began + 2):
-            return self.over()
+            return self.is_over()
         self.seen = now
         return self.row().get("status") == DISCARDED
 
@@ -162,7 +162,7 @@ def _narrowed(run: Run, problem: Problem, watch: Watch, certificates: Path) -> P
     path = _certificate(run, certificates)
     if not path.exists():
         limits = cf.Limits(run.limit, gap=0)
-        proof = cf.prove(problem.instance, norm=_norm(run), limits=limits, jobs=1, stop=watch.over)
+        proof = cf.prove(problem.instance, norm=_norm(run), limits=limits, jobs=1, stop=watch.is_over)
         cf.write_certificate(proof, path)
     return with_windows(problem, _windows(path, problem.instance))
 

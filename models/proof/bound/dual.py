@@ -27,7 +27,7 @@ from ...field.field import CrossField
 from ...instance.domain import Bools, Floats
 from ...instance.grid import Grid
 from ...processes.compilation import Crew
-from ...processes.deadline import Over, never
+from ...processes.deadline import IsOver, never
 from ..checkers import check_certificate
 from .clusters import (
     copy_tables,
@@ -103,18 +103,18 @@ class Dual:
         del self.state, state  # the new arrays need its memory
         self._start_on(lattice, shares, clusters)
 
-    def forward(self, over: Over = never) -> float:
+    def forward(self, is_over: IsOver = never) -> float:
         """The bound after a forward pass; -inf if time cut it off."""
-        return self._pass(0, over)
+        return self._pass(0, is_over)
 
-    def backward(self, over: Over = never) -> float:
+    def backward(self, is_over: IsOver = never) -> float:
         """The bound after a backward pass; -inf if time cut it off."""
-        return self._pass(2, over)
+        return self._pass(2, is_over)
 
-    def ascend(self, times: int, over: Over = never, closing: Over = never) -> float:
+    def ascend(self, times: int, is_over: IsOver = never, closing: IsOver = never) -> float:
         """The bound after that many passes forwards and backwards; -inf if time does not allow all of them.
 
-        over: returns whether to cut a pass off. closing: returns whether not to begin another two.
+        is_over: returns whether to cut a pass off. closing: returns whether not to begin another two.
         """
         bound = -math.inf
         for left in reversed(range(times)):
@@ -123,14 +123,14 @@ class Dual:
                     self.update_clusters(-1)
                 return -math.inf
             self.update_clusters(1, _BEYOND)
-            self.forward(over)
+            self.forward(is_over)
             self.update_clusters(-1, _BEYOND if left else 1.0)
-            bound = self.backward(over)
-            if over():
+            bound = self.backward(is_over)
+            if is_over():
                 return -math.inf if left else bound
         return bound
 
-    def _pass(self, earlier: int, over: Over) -> float:
+    def _pass(self, earlier: int, is_over: IsOver) -> float:
         """The bound after a pass; earlier: 0 forwards, 2 backwards."""
         began, way, nothing = time.monotonic(), 1 if earlier == 0 else -1, np.zeros(0)
 
@@ -141,7 +141,7 @@ class Dual:
             visit(np.concatenate(self._fronts[::way]))
         else:
             for front, parts in zip(self._fronts[::way], self._parts[::way], strict=True):
-                if over():
+                if is_over():
                     return -math.inf
                 self._crew.run(visit, [front[part] for part in parts])
         self._pass_seconds = time.monotonic() - began

@@ -17,7 +17,7 @@ from ...instance.angles import HALF, QUARTER
 from ...instance.domain import Bools, Floats
 from ...instance.sparse_systems import SimilarSystems
 from ...processes.compilation import compiled, inlined
-from ...processes.deadline import Over, never
+from ...processes.deadline import IsOver, never
 from ...search.box_qp import FreeField
 from ...search.improvement import improved_field, settle
 from .dual import Dual
@@ -26,7 +26,7 @@ from .state import Indices, State
 
 _BETTER: Final = 1e-9  # relative: rounding is no improvement
 
-BetterField = Callable[[CrossField, CrossField, Over], CrossField]
+BetterField = Callable[[CrossField, CrossField, IsOver], CrossField]
 """Returns the better of a rounded field and the best one so far, improved."""
 
 
@@ -37,17 +37,17 @@ class Rounding:
         self._dual, self._better_field = dual, better_field
         self._tried: set[bytes] = set()
 
-    def lower(self, best: CrossField, over: Over = never) -> CrossField:
+    def lower(self, best: CrossField, is_over: IsOver = never) -> CrossField:
         """`best`, or a lower field that the shares suggest; before and after it the last pass is backward."""
-        best = self._round_dual(best, over, forwards=True)
-        if over():
+        best = self._round_dual(best, is_over, forwards=True)
+        if is_over():
             return best
         self._dual.forward()
-        best = self._round_dual(best, over, forwards=False)
+        best = self._round_dual(best, is_over, forwards=False)
         self._dual.backward()
         return best
 
-    def _round_dual(self, best: CrossField, over: Over, *, forwards: bool) -> CrossField:
+    def _round_dual(self, best: CrossField, is_over: IsOver, *, forwards: bool) -> CrossField:
         instance = best.instance
         alpha, beta = decode(self._dual.state, forwards=forwards)
         rounded = field_in_windows(instance, alpha, beta, free_jumps(instance, alpha, beta)[0])
@@ -55,17 +55,19 @@ class Rounding:
         if jumps in self._tried:
             return best
         self._tried.add(jumps)
-        return self._better_field(rounded, best, over)
+        return self._better_field(rounded, best, is_over)
 
 
-def better_field(rounded: CrossField, best: CrossField, over: Over) -> CrossField:
+def better_field(rounded: CrossField, best: CrossField, is_over: IsOver) -> CrossField:
     """The field of lower 2-norm energy: the best field, or the new one, improved where that may pay."""
     state = FreeField.of(rounded)
-    settle(state, SimilarSystems(), over)
+    settle(state, SimilarSystems(), is_over)
     if state.energy >= best.energy().total * (1 - _BETTER):
         return best
     return min(
-        best, improved_field(state.fit_in_bounds(over), stop=over), key=lambda field: field.energy().total
+        best,
+        improved_field(state.fit_in_bounds(is_over), stop=is_over),
+        key=lambda field: field.energy().total,
     )
 
 

@@ -13,7 +13,7 @@ from typing import cast
 from ...field.field import AbsoluteNorm, CrossField, Norm
 from ...field.jumps import best_jumps
 from ...instance.instance import Instance
-from ...processes.deadline import Over, never
+from ...processes.deadline import IsOver, never
 from ...search.angle_program import alternate_absolute, fit_absolute
 from ..bound.dual import Dual
 from ..bound.lattice import Lattice
@@ -26,10 +26,10 @@ class AbsoluteDescent(Descent):
     norm: AbsoluteNorm
 
     @staticmethod
-    def first_field(instance: Instance, norm: Norm, start: CrossField | None, over: Over) -> CrossField:
+    def first_field(instance: Instance, norm: Norm, start: CrossField | None, is_over: IsOver) -> CrossField:
         """The better one of the 2-norm's first field and the user's field, both fitted."""
-        fields = [Descent.first_field(instance, 2, None, over)] + ([] if start is None else [start])
-        fitted = [alternate_absolute(field, cast("AbsoluteNorm", norm), over) for field in fields]
+        fields = [Descent.first_field(instance, 2, None, is_over)] + ([] if start is None else [start])
+        fitted = [alternate_absolute(field, cast("AbsoluteNorm", norm), is_over) for field in fields]
         return min(fitted, key=lambda field: field.energy(norm).total)
 
     def first_level(self, centre: CrossField) -> Lattice:
@@ -39,13 +39,13 @@ class AbsoluteDescent(Descent):
         around, slopes = fit_absolute(CrossField(instance, centre.alpha, centre.beta, jumps), self.norm)
         return Lattice.common(around, self.norm, slopes, COARSEST)
 
-    def better_field(self, rounded: CrossField, best: CrossField, over: Over) -> CrossField:
+    def better_field(self, rounded: CrossField, best: CrossField, is_over: IsOver) -> CrossField:
         """The better one of a best field and a new one, fitted."""
-        return min(best, alternate_absolute(rounded, self.norm, over), key=self.energy)
+        return min(best, alternate_absolute(rounded, self.norm, is_over), key=self.energy)
 
-    def improve_field(self, field: CrossField, over: Over = never) -> CrossField:
+    def improve_field(self, field: CrossField, is_over: IsOver = never) -> CrossField:
         """The field, fitted."""
-        return alternate_absolute(field, self.norm, over)
+        return alternate_absolute(field, self.norm, is_over)
 
     def _search(self, _seconds: float, /) -> bool:
         """Do nothing: rounding finds better fields than the search, which is for the 2-norm."""

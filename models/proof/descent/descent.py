@@ -28,7 +28,7 @@ from ...field.field import CrossField, Norm, field_in_windows
 from ...field.jumps import free_jumps
 from ...instance.instance import Instance
 from ...processes.compilation import Crew
-from ...processes.deadline import Deadline, Over, Progress, never
+from ...processes.deadline import Deadline, IsOver, Progress, never
 from ...processes.limits import Limits
 from ...search.improvement import improved_field
 from ...search.search import search
@@ -88,7 +88,7 @@ class Termination:
     """
 
     deadline: Deadline
-    stop: Over
+    stop: IsOver
     gap: float
     work: float
     labels: int = 0
@@ -101,7 +101,7 @@ class Termination:
             return "work"
         return "time" if self.deadline.passed() else ""
 
-    def over(self, ahead: float = 0.0) -> bool:
+    def is_over(self, ahead: float = 0.0) -> bool:
         """Whether work has to end now, or within `ahead` seconds."""
         return bool(self.reason()) or self.deadline.left() <= ahead
 
@@ -129,13 +129,13 @@ class Descent:
     tired: bool = False  # whether the last search ended because it found nothing for long
 
     @staticmethod
-    def first_field(instance: Instance, _norm: Norm, start: CrossField | None, over: Over) -> CrossField:
+    def first_field(instance: Instance, _norm: Norm, start: CrossField | None, is_over: IsOver) -> CrossField:
         """The best of the first field, the user's field and, in time, the PolyVector start, each improved."""
-        return start_fields(instance, start, over, polyvector_start)[0]
+        return start_fields(instance, start, is_over, polyvector_start)[0]
 
-    def improve_field(self, field: CrossField, over: Over = never) -> CrossField:
+    def improve_field(self, field: CrossField, is_over: IsOver = never) -> CrossField:
         """The field, with jumps and angles improved."""
-        return improved_field(field, stop=over)
+        return improved_field(field, stop=is_over)
 
     def first_level(self, centre: CrossField) -> Lattice:
         """The lattice of the first level round a field."""
@@ -207,7 +207,7 @@ class Descent:
         """
         rounding, reached, rises = Rounding(dual, self.better_field), -math.inf, [math.inf] * 2
         for _ in range(_MOST_ROUNDS):
-            bound = dual.ascend(_PASSES, self.ends.over, lambda: self._is_closing(dual))
+            bound = dual.ascend(_PASSES, self.ends.is_over, lambda: self._is_closing(dual))
             self.best = rounding.lower(self.best, lambda: self._is_closing(dual))
             energy = self.energy(self.best)
             labels = int(dual.lattice.allowed.sum())
@@ -228,11 +228,11 @@ class Descent:
         chain, energy = self.chain, self.energy(self.best)
         rough, left = _ROUGH * (1 + energy), None
         level, arrays = record_of(dual, energy, rough if self.gap > rough else 0.0)
-        if level.bound > chain.bound or not self.ends.over():
+        if level.bound > chain.bound or not self.ends.is_over():
             chain.add(level, arrays)
-        if not self.ends.over():
+        if not self.ends.is_over():
             one, _ = dual.expected_seconds(dual.lattice)
-            left = dual.remaining_cells(level.bound, energy, combs=not self.ends.over(_COMBS * one))
+            left = dual.remaining_cells(level.bound, energy, combs=not self.ends.is_over(_COMBS * one))
             if left.is_empty:
                 chain.convex, left = energy, None
             else:
@@ -248,7 +248,7 @@ class Descent:
         chain.forced = int(has_forced_jump(terms, step.p, step.boxes).sum())
         if has_few_open(terms, step):
             energy = self.energy(self.best)
-            minimum = minimise_on_boxes(self.instance, terms, step, energy, self.ends.over)
+            minimum = minimise_on_boxes(self.instance, terms, step, energy, self.ends.is_over)
             convex = min(minimum.bound, energy)
             if convex > chain.bound:
                 chain.convex = convex
@@ -256,12 +256,12 @@ class Descent:
             if minimum.bound < energy:
                 field = minimum.field
                 better = field_in_windows(self.instance, field.alpha, field.beta, field.p)
-                self.best = min(self.best, self.improve_field(better, self.ends.over), key=self.energy)
+                self.best = min(self.best, self.improve_field(better, self.ends.is_over), key=self.energy)
 
     def _add_clusters(self, dual: Dual) -> None:
         """Add clusters at the beginning of a spacing, if vortices cause the gap."""
         if self._needs_clusters(dual.lattice):
-            dual.ascend(_PASSES, self.ends.over, lambda: self._is_closing(dual))
+            dual.ascend(_PASSES, self.ends.is_over, lambda: self._is_closing(dual))
             count = max(_CLUSTERS, _CLUSTERS_OF_ALL * len(self.instance.grid.quads))
             dual.add_clusters(math.ceil(count / 2 if len(dual.quads) else count), self.best)
 
@@ -282,13 +282,13 @@ class Descent:
             due = spent >= self.next_search
         else:
             due = not self.searches and self.gap > _WIDE * self.energy(self.best)
-        if due and not self.ends.over(seconds):
+        if due and not self.ends.is_over(seconds):
             self._search(seconds if timed else math.inf)
             self.next_search = _NEXT_SEARCH * spent
 
     def _search_on(self) -> bool:
         """Search for the time that no level uses; whether a better field is found in time for a chain."""
-        while not self.ends.over():
+        while not self.ends.is_over():
             left = _CLOSED * self.ends.deadline.left()
             chain = left > 2 * self.took
             if self._search(left / 2 if chain else left) and chain:
@@ -317,13 +317,13 @@ class Descent:
     def _has_time_for(self, dual: Dual, lattice: Lattice) -> bool:
         """Whether there is time for a level on the next lattice: its record, and passes that take as long."""
         one, tables = dual.expected_seconds(lattice)
-        return not self.ends.over(_RECORD * (2 * one + tables))
+        return not self.ends.is_over(_RECORD * (2 * one + tables))
 
     def _is_closing(self, dual: Dual) -> bool:
         """Whether only the time to record the level is left."""
         one, tables = dual.expected_seconds(dual.lattice)
         passes = _RECORD if self._is_near_end(dual) else _RECORD - _COMBS
-        return self.ends.over(passes * one + 2 * tables)
+        return self.ends.is_over(passes * one + 2 * tables)
 
     def _is_near_end(self, dual: Dual) -> bool:
         """Whether the level before left so few jumps open that this one may be the last."""

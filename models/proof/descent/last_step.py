@@ -20,7 +20,7 @@ from ...field.field import CrossField, Norm
 from ...instance.angles import HALF, QUARTER
 from ...instance.domain import Bools, Floats
 from ...instance.instance import Instance
-from ...processes.deadline import Over, never
+from ...processes.deadline import IsOver, never
 from ...search.angle_program import solve_angle_program
 from ...search.box_qp import field_at
 from ..bound.pruning import RemainingCells
@@ -122,7 +122,7 @@ class _Node:
 
 
 def minimise_on_boxes(
-    instance: Instance, terms: EnergyTerms, step: LastStep, energy: float, over: Over = never
+    instance: Instance, terms: EnergyTerms, step: LastStep, energy: float, is_over: IsOver = never
 ) -> BoxMinimum:
     """Find the least energy on the boxes of a last step, and prove a bound of it.
 
@@ -132,7 +132,7 @@ def minimise_on_boxes(
     root = _Node(whole, _minimise_on_piece(instance, terms, step, whole))
     waiting, count, enough = [root], 1, energy - EXACT / 2 * (1 + energy)
     hoped = root.minimum.bound + _TRIAL_PART * (energy - root.minimum.bound)
-    while waiting[0].minimum.bound < enough and count < _MOST_NODES and not (count > 1 and over()):
+    while waiting[0].minimum.bound < enough and count < _MOST_NODES and not (count > 1 and is_over()):
         node = waiting[0]
         node.cut = _find_cut(terms, step, node.piece, node.minimum.x)
         if node.cut < 0:

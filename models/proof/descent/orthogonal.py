@@ -72,7 +72,7 @@ def prove_orthogonal(
     """
     began = time.monotonic()
     energy = OrthogonalEnergy.of(instance)
-    starts = starting_integers(instance, energy, start, ends.over)
+    starts = starting_integers(instance, energy, start, ends.is_over)
     prover = _Prover(instance, energy, starts, ends, progress, seed)
     return prover.proof(prover.run(), began), prover.limit
 
@@ -189,7 +189,7 @@ class _Prover:
                 f"the coarsest level has {costs} pairs of labels; at most {_MOST_COSTS} fit in memory"
             )
             return reason or "labels"
-        if not small and not reason and self.ends.over(_SECONDS * costs):
+        if not small and not reason and self.ends.is_over(_SECONDS * costs):
             self.reason = f"the coarsest level takes about {_SECONDS * costs:.0f} s; increase the time limit"
             return "time"
         return "" if reason == "time" and small and not self.proven.levels else reason
@@ -206,12 +206,12 @@ class _Prover:
             costs = checker.costs_of(level)
             dual = RingDual(level, costs, self.order, rings)
             ahead = max(chain.seconds + 2 * dual.work * chain.pace, self.proven.seconds)
-            if chain.levels and self.ends.over(ahead):
+            if chain.levels and self.ends.is_over(ahead):
                 return self.ends.reason() or "time"
             if before is not None:
                 dual.interpolate(before)
             closing = self._ascend(dual, chain, ahead)
-            if self._find_better_field(dual) and not self.ends.over():
+            if self._find_better_field(dual) and not self.ends.is_over():
                 return ""
             least = self.least
             squares = self._record(chain, dual, costs)
@@ -250,7 +250,7 @@ class _Prover:
                 update_rings(dual.state, dual.rings, max(most - bound, 0.0))
             gap = most - bound
             closing = rings and number > 1 and _TINY * most < gap < _CLOSER * chain.gap
-            if self.ends.over(ahead) or closing or (rings and gap < _ENOUGH * chain.gap):
+            if self.ends.is_over(ahead) or closing or (rings and gap < _ENOUGH * chain.gap):
                 break
             if number % _PASSES == _PASSES - 1:
                 if bound - reached < _SLOW[rings and gap > _WIDE * most] * gap or left < _FEW_LEFT:
@@ -266,7 +266,7 @@ class _Prover:
     def _find_better_field(self, dual: RingDual) -> bool:
         """Whether the shares suggest a better field, which then is the best one."""
         z = self.energy.nearest(dual.decode())
-        return self._offer(self.energy.descend(z, over=self.ends.over))
+        return self._offer(self.energy.descend(z, is_over=self.ends.is_over))
 
     def _search_if_due(self) -> bool:
         """Whether a search finds a better field. All of them may take as long as the levels."""
@@ -277,7 +277,7 @@ class _Prover:
 
     def _search_on(self) -> bool:
         """Search for the rest of the time, or for half of it and whether a better field is worth a chain."""
-        while (left := self.ends.deadline.left() - self.proven.seconds) > 0 and not self.ends.over():
+        while (left := self.ends.deadline.left() - self.proven.seconds) > 0 and not self.ends.is_over():
             close = self.least - self.proven.bound <= _LOOSE * self.least
             chain = left == math.inf or (close and left > 2 * self.took)
             if self._search(left / 2 if chain else left) and chain:
@@ -298,11 +298,11 @@ class _Prover:
             self.hunt = IntegerSearch(self.energy, self.instance.domain.rings, starts, self.seed)
         begin, last = clock(), self.hunt.round + _ROUNDS if seconds == math.inf else math.inf
 
-        def over() -> bool:
-            return self.ends.over(self.proven.seconds)
+        def is_over() -> bool:
+            return self.ends.is_over(self.proven.seconds)
 
-        while clock() < begin + seconds and self.hunt.round < last and not over() and not self._is_tired():
-            self.hunt.explore(over)
+        while clock() < begin + seconds and self.hunt.round < last and not is_over() and not self._is_tired():
+            self.hunt.explore(is_over)
             self._offer(self.hunt.best.p)
             self.progress(f"search: energy {self.least:.5g} after {self.hunt.round} rounds")
         self.searched += clock() - begin

@@ -25,6 +25,7 @@ from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.building.fields import improve_in_1norm
 from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.documents.documents import problem_of, read_library
+from crossfield.export.library.documents.lock import library_lock
 from crossfield.export.library.documents.statistics import tangent_bound
 from crossfield.export.library.plan.instances import make_instance
 from crossfield.export.library.plan.recipe import plan_library
@@ -502,10 +503,15 @@ def test_two_builds_in_one_folder_come_one_after_the_other(built, spec, tmp_path
     """Each ends with the library of a single one, and neither writes a lock."""
     out = tmp_path / "out"
     out.mkdir()
-    both = [subprocess.Popen(build_command(spec, out, "1"), stderr=subprocess.PIPE, text=True) for _ in "ab"]
-    said = [process.communicate()[1] for process in both]
+    with library_lock(out, "this test"):
+        both = [
+            subprocess.Popen(build_command(spec, out, "1"), stderr=subprocess.PIPE, text=True) for _ in "ab"
+        ]
+        for process in both:
+            assert any("waits for another process, which is at work on" in line for line in process.stderr)
+    for process in both:
+        process.communicate()
     assert [process.returncode for process in both] == [0, 0]
-    assert any("waits for another process, which is at work on" in text for text in said)
     assert content(out) == content(built.folder)
 
 

@@ -186,7 +186,7 @@ def test_greedy_is_one_solution_of_exact_rounds_and_one_of_many_at_once(monkeypa
     exact = round_greedily(energy)
     assert not exact[find_forest_rows(energy)].any()
     monkeypatch.setattr(greedy_module, "MOST_DENSE", 0)
-    many, at_once = round_greedily(energy), round_greedily(energy, over=lambda: True)
+    many, at_once = round_greedily(energy), round_greedily(energy, is_over=lambda: True)
     totals = [energy.least_total(z) for z in (exact, many, at_once)]
     assert totals[0] <= 1.3 * totals[1]
     assert totals[1] <= totals[2]

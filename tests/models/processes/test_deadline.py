@@ -54,11 +54,11 @@ def test_a_deadline_goes_to_another_process():
 
 def test_a_request_to_stop_is_a_function_or_an_event():
     happened = threading.Event()
-    over = stop_function(happened)
-    assert not over()
+    is_over = stop_function(happened)
+    assert not is_over()
     happened.set()
-    assert over()
-    assert stop_function(over) is over
+    assert is_over()
+    assert stop_function(is_over) is is_over
     assert not stop_function(None)()
     with pytest.raises(InputError, match="stop is bool; give a function"):
         stop_function(True)

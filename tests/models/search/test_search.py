@@ -191,8 +191,8 @@ class Hourglass:
 
 
 WORK = {
-    "greedy": lambda over: greedy_field(cf.sample("mouse", 16), stop=over),
-    "improved": lambda over: improved_field(greedy_field(cf.sample("mouse", 16)), stop=over),
+    "greedy": lambda is_over: greedy_field(cf.sample("mouse", 16), stop=is_over),
+    "improved": lambda is_over: improved_field(greedy_field(cf.sample("mouse", 16)), stop=is_over),
 }
 
 

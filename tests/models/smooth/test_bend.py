@@ -135,15 +135,15 @@ def test_rounds_end_when_the_time_is_over():
     start = polyvector_field(cf.sample("mouse", 16), hold=max(HOLDS))
     calls = []
 
-    def over(rounds):
+    def is_over_after(rounds):
         calls.append(rounds)
         return len(calls) > rounds
 
-    assert bend_field(start, stop=lambda: over(0)) is start
+    assert bend_field(start, stop=lambda: is_over_after(0)) is start
     energies = []
     for rounds in (1, 2, 3):
         calls.clear()
-        field = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: over(rounds))
+        field = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: is_over_after(rounds))
         assert len(calls) == rounds + 1
         energies.append(_Bend.of(start, HARMONIC, HOLD).at(np.concatenate([field.u_angle, field.v_angle]))[0])
     assert energies == sorted(energies, reverse=True)
