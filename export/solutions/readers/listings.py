@@ -195,7 +195,7 @@ LISTINGS = (
     TextLayout(
         "osrl",
         "OSrL, the results of Optimization Services",
-        signature=rb"(?:<\?xml[^\n]*\n(?:[^\n]*\n){0,9}?)?[ \t]*<osrl\b",
+        signature=rb"(?:<\?xml[^\n]*\n(?:[^\n]*\n){0,9}?[ \t]*)?<osrl\b",
         claims=(rb"STATUS (?P<status>\S+)", rb"OBJ (?P<objective>\S+)"),
         rewrites=(
             (b"<", rb">\s*<", b">\n<"),
