@@ -216,4 +216,4 @@ def test_commands_in_any_order_lose_nothing_and_write_nothing_by_halves():
 @pytest.mark.slow
 def test_many_commands_in_any_order_lose_nothing_and_write_nothing_by_halves():
     inputs()
-    run_state_machine_as_test(Folder, settings=settings(max_examples=40, stateful_step_count=20))
+    run_state_machine_as_test(Folder, settings=settings(max_examples=20, stateful_step_count=15))
