@@ -149,14 +149,14 @@ def check_proof(
     return _confirm(proof, check_certificate.check_last_step(proof.certificate(), passed))
 
 
-def _check_orthogonal(proof: Proof, limit: Floats | None) -> check_certificate.Verdict:
+def _check_orthogonal(proof: Proof, limit: Floats | None) -> check_certificate.Findings:
     arrays = replace(proof, bound=0.0).certificate()
     memory = check_certificate.memory_for(len(pack_arrays(arrays)), check_orthogonal.MORE_ROOM)
-    verdict: check_certificate.Verdict = check_orthogonal.check_arrays(arrays, limit, memory)
-    return verdict
+    findings: check_certificate.Findings = check_orthogonal.check_arrays(arrays, limit, memory)
+    return findings
 
 
-def _confirm(proof: Proof, proven: check_certificate.Verdict) -> Proof:
+def _confirm(proof: Proof, proven: check_certificate.Findings) -> Proof:
     """The proof with what the checker confirms."""
     ended = "optimal" if proven.status == "optimal" else proof.ended
     return proof.confirmed(proven, bound=proven.bound, ended=ended)
@@ -274,13 +274,13 @@ def read_certificate(
 
 def _check_any(
     data: bytes, path: Path, jobs: int, progress: Progress
-) -> tuple[CrossField, float, check_certificate.Verdict]:
+) -> tuple[CrossField, float, check_certificate.Findings]:
     """Field, claimed bound and findings of the checker, for either kind of crosses."""
     arrays = check_certificate.unpack_archive(data)
     head = check_certificate.refuse_damage(check_certificate.json_of)(arrays, "head")
     if head.get("format") == check_orthogonal.FORMAT:
         memory = check_certificate.memory_for(len(data), check_orthogonal.MORE_ROOM)
-        proven: check_certificate.Verdict = check_orthogonal.check_arrays(arrays, memory=memory)
+        proven: check_certificate.Findings = check_orthogonal.check_arrays(arrays, memory=memory)
     else:
         check_certificate.check_sizes(arrays, len(data))
         with _pass_function(arrays, jobs, progress) as pass_all:

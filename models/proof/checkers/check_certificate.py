@@ -1164,7 +1164,7 @@ class PassedLevels:
 
 
 @dataclass
-class Verdict:
+class Findings:
     """Findings of the checker: what the certificate proves.
 
     bound: what a certificate may claim everywhere; it is less than what is proven here by a margin for other
@@ -1198,7 +1198,7 @@ def gap_of(energy: float, bound: float) -> float:
 
 
 @refuse_damage
-def check_arrays(arrays: dict[str, Array], do_all: Callable[..., Any] = map) -> Verdict:
+def check_arrays(arrays: dict[str, Array], do_all: Callable[..., Any] = map) -> Findings:
     """Check the arrays of a certificate and return what they prove.
 
     do_all: as of `pass_levels`. Raises NotProvenError when a level does not follow from the one before, or
@@ -1267,7 +1267,7 @@ def pass_levels(
     return PassedLevels(whole, terms, pixels, pairs, energy, error, slack, bounds, last)
 
 
-def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> Verdict:
+def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> Findings:
     """Do the last step, and compare what is proven with what the certificate claims."""
     terms, energy, last = passed.terms, passed.energy, passed.last
     require(last is not None, "the last level", "leaves nothing, not even the field")
@@ -1287,7 +1287,7 @@ def check_last_step(arrays: dict[str, Array], passed: PassedLevels) -> Verdict:
     here = last_step(terms, boxes[passed.pixels], alpha[passed.pixels], p[passed.pairs])
     same = np.all([piece.p == here.p for piece in left], axis=0)
     pairs[passed.pairs] = np.all([piece.has_known_jump(terms) for piece in left], axis=0) & same
-    claim = Verdict(status_of(energy, bound), terms.norm, energy, bound, pairs, passed.bounds, boxes)
+    claim = Findings(status_of(energy, bound), terms.norm, energy, bound, pairs, passed.bounds, boxes)
     check_claim(head_of(arrays), claim, proven, passed.error)
     return claim
 
@@ -1299,7 +1299,7 @@ def widest_box(boxes: list[Array]) -> Array:
     return widest
 
 
-def check_claim(head: dict[str, Any], claim: Verdict, most: float, error: float) -> None:
+def check_claim(head: dict[str, Any], claim: Findings, most: float, error: float) -> None:
     """Raise NotProvenError unless the claim is proven. most: the greatest bound that is."""
     energy, bound = number_in(head, "energy", 0.0, math.inf), number_in(head, "bound", -math.inf, math.inf)
     close = abs(energy - claim.energy) <= error + 1e-12 * max(1.0, claim.energy)
@@ -1314,12 +1314,12 @@ def check_claim(head: dict[str, Any], claim: Verdict, most: float, error: float)
         )
 
 
-def check_bytes(data: bytes) -> Verdict:
+def check_bytes(data: bytes) -> Findings:
     """Check the bytes of a certificate. Raises as `check_arrays`."""
     return check_arrays(unpack_arrays(data))  # type: ignore[no-any-return]
 
 
-def main(arguments: list[str], check: Callable[[bytes], Verdict] = check_bytes) -> int:
+def main(arguments: list[str], check: Callable[[bytes], Findings] = check_bytes) -> int:
     """Print the verdict and return the exit code."""
     if len(arguments) != 1 or arguments[0].startswith("-"):
         print(f"usage: python {Path(sys.argv[0]).name} FILE")

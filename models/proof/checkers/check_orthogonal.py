@@ -493,7 +493,7 @@ def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
 @base.refuse_damage
 def check_arrays(
     arrays: dict[str, Array], limit: Array | None = None, memory: int = MOST_MEMORY
-) -> base.Verdict:
+) -> base.Findings:
     """Check the arrays of a certificate and return what they prove.
 
     limit: of Lemma 1, where it is known. memory: most bytes for the check. Raises NotProvenError when a level
@@ -535,7 +535,7 @@ def check_arrays(
     proven = max(0.0, min(least, energy - error) - rows.slack)
     bound = max(0.0, proven - base.SPARE * (1 + proven))
     status, forced = base.status_of(energy, bound), (turns[: rows.pairs] == CENTRAL).all(axis=1) & same
-    claim = base.Verdict(status, 2, energy, bound, forced, bounds)
+    claim = base.Findings(status, 2, energy, bound, forced, bounds)
     base.check_claim(head, claim, proven, error)
     return claim
 
@@ -546,7 +546,7 @@ def check_names(arrays: dict[str, Array], levels: int) -> None:
     base.compare_names(arrays, {*PARTS, *of_domain} | ({WEIGHTS} & arrays.keys()), LEVEL_PARTS, levels)
 
 
-def check_bytes(data: bytes) -> base.Verdict:
+def check_bytes(data: bytes) -> base.Findings:
     """Check the bytes of a certificate. Raises as `check_arrays`."""
     memory = base.memory_for(len(data), MORE_ROOM)
     return check_arrays(base.unpack_archive(data), memory=memory)  # type: ignore[no-any-return]

@@ -40,7 +40,7 @@ from ..bound.pruning import RemainingCells, finer_lattice, smaller_lattice
 from ..bound.rounding import Rounding, better_field
 from ..checkers.check_certificate import MOST_COUNT, has_forced_jump, level_memory, memory_for
 from .last_step import energy_terms, has_few_open, last_step_on, minimise_on_boxes
-from .record import EXACT, Chain, Level, Proof
+from .record import EXACT, Chain, LevelFacts, Proof
 
 # Levels
 COARSEST: Final = 16  # steps in pi/2 of the first level, whose passes cost least
@@ -347,13 +347,13 @@ class Descent:
         self.progress(f"energy {self.energy(self.best):.5g}, bound {bound:.5g}, {labels} labels")
 
 
-def record_of(dual: Dual, energy: float, least_gap: float = 0.0) -> tuple[Level, Arrays]:
+def record_of(dual: Dual, energy: float, least_gap: float = 0.0) -> tuple[LevelFacts, Arrays]:
     """The level of a dual with its arrays; shares and tables are first rounded, as for that gap at least.
 
     Where the bound exceeds the energy, rounding costs a small part of the excess.
     """
     quanta = dual.quantise(max(abs(energy - dual.bound()), least_gap))
-    return Level(dual.lattice.h, int(dual.lattice.allowed.sum()), dual.bound()), dual.arrays(quanta)
+    return LevelFacts(dual.lattice.h, int(dual.lattice.allowed.sum()), dual.bound()), dual.arrays(quanta)
 
 
 def _slow_rise(left: float) -> float:

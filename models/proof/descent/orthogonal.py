@@ -31,7 +31,7 @@ from ..bound.orthogonal_dual import RingDual, update_rings
 from ..checkers import check_orthogonal as checker
 from ..checkers.check_certificate import OPTIMAL
 from ..checkers.check_orthogonal import CellLevel, CentredRows
-from .record import INSTANCE, Chain, Level, Proof
+from .record import INSTANCE, Chain, LevelFacts, Proof
 
 if TYPE_CHECKING:
     from .descent import Termination
@@ -333,7 +333,7 @@ class _Prover:
         bits = np.packbits(squares[: level.squares.begin[rows.pairs]])
         chain.arrays |= {f"{prefix}forests": forests, f"{prefix}squares": bits}
         chain.arrays["divisions"] = np.append(chain.arrays["divisions"], np.int32(level.divisions))
-        chain.levels.append(Level(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
+        chain.levels.append(LevelFacts(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
         turns = checker.possible_turns(level, squares)
         chain.forced = int((turns[: rows.pairs] == checker.CENTRAL).all(axis=1).sum())
         cases = [(rows.nearest + np.array(case)).astype(np.int32) for case in checker.cases_of(turns)]

@@ -14,7 +14,7 @@ from ...array_archive import Arrays
 from ...field.field import CrossField, Norm
 from ...instance.file import instance_arrays
 from ..checkers import check_certificate, check_orthogonal
-from ..checkers.check_certificate import Verdict, gap_of, status_of
+from ..checkers.check_certificate import Findings, gap_of, status_of
 
 Status = Literal["optimal", "gap"]
 
@@ -23,7 +23,7 @@ INSTANCE: Final = "instance_"
 """Prefix of the names of the instance's arrays in a certificate."""
 
 
-class Level(NamedTuple):
+class LevelFacts(NamedTuple):
     """Spacing of the labels of a refinement level in radians, their number, and the bound of the level."""
 
     h: float
@@ -39,7 +39,7 @@ class Chain:
     number of pairs with the same jump in every field that could be better.
     """
 
-    levels: list[Level] = field(default_factory=list)
+    levels: list[LevelFacts] = field(default_factory=list)
     arrays: Arrays = field(default_factory=dict)
     convex: float = -math.inf
     forced: int = 0
@@ -50,11 +50,11 @@ class Chain:
         return max([0.0, self.convex, *(level.bound for level in self.levels)])
 
     @property
-    def last_of_spacings(self) -> list[Level]:
+    def last_of_spacings(self) -> list[LevelFacts]:
         """The last level of each spacing."""
         return list({level.h: level for level in self.levels}.values())
 
-    def add(self, level: Level, arrays: Arrays) -> None:
+    def add(self, level: LevelFacts, arrays: Arrays) -> None:
         """Add a level with its arrays."""
         self.arrays |= {f"level_{len(self.levels)}_{name}": array for name, array in arrays.items()}
         self.levels.append(level)
@@ -86,9 +86,9 @@ class Claim:
     bound: float
     forced: int
     norm: Norm = 2
-    proven: Verdict | None = dataclasses.field(default=None, init=False, repr=False)  # not by `replace`
+    proven: Findings | None = dataclasses.field(default=None, init=False, repr=False)  # not by `replace`
 
-    def confirmed(self, proven: Verdict, **changes: Any) -> Self:
+    def confirmed(self, proven: Findings, **changes: Any) -> Self:
         """The claim with the findings of the checker, and with other changes."""
         claim = replace(self, forced=proven.forced, **changes)
         object.__setattr__(claim, "proven", proven)
@@ -130,7 +130,7 @@ class Proof(Claim):
 
     """
 
-    levels: tuple[Level, ...]
+    levels: tuple[LevelFacts, ...]
     seconds: float
     ended: str
     arrays: Arrays = dataclasses.field(repr=False)
