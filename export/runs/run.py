@@ -160,7 +160,8 @@ def run(
         request = Request(instance, new.path / "solve", limits, progress=progress, stop=stop_function(stop))
         report = _find_and_draw(request, new, underlay, with_earlier=not force)
         if MASK not in names:
-            shutil.copyfile(folder / MASK, new.path / MASK)
+            shutil.copyfile(folder / MASK, new.path / MASK)  # the page looks for it
+            new.kept.add(MASK)
         elif has_mask(instance):
             write_mask(instance, new.path / MASK)
         has_all = not report.interrupted or _take_over(new, names)

@@ -55,7 +55,7 @@ COMMANDS = {
     "shade": "shade {source}/good.npz --side 9 -o {folder}",
     "shade a sketch": "shade {source}/tiny.json --side 9 -o {folder}",
 }
-SLOW = {"run": "run {source}/drawing.svg --size 6 --time-limit 0.5 -o {folder}"}
+SLOW = {"run": "run {source}/drawing.svg --size 6 --time-limit 8 -o {folder}"}  # both stages end
 BUT_FOR_SECONDS = re.compile(rb'("seconds": )[0-9.]+|(.*\.log$)')
 
 

@@ -61,7 +61,7 @@ def test_what_the_process_may_map_counts(tmp_path):
     strokes = np.stack([np.arange(side), np.zeros(side, int)], axis=1)
     million = cf.Instance.on_pixels("m", np.ones((side, side), bool), strokes, np.zeros(side), np.ones(side))
     cf.write_instance(million, tmp_path / "million.npz")
-    line = within_memory(EXPORT, tmp_path, 1.5)
+    line = within_memory(EXPORT, tmp_path, 1.4)
     assert "a grid of 1000000 pixels needs about 1.5 GB to be written, but 1." in line or "but 0." in line
     assert not (tmp_path / "million.lp").exists()
 

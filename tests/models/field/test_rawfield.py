@@ -22,7 +22,7 @@ def assert_same_crosses(one, other):
 @settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=30)
 def test_a_written_field_comes_back(tmp_path, seed, gauge):
     field = random_field(random_instance(seed, gauge=gauge), seed)
-    back = read_field(write_field(field, tmp_path / "field.rawfield"), on=field.instance)
+    back = read_field(write_field(field, tmp_path / "field.rawfield", force=True), on=field.instance)
     assert_same_crosses(field, back)
     assert back.energy().total == pytest.approx(field.energy().total, rel=1e-9, abs=1e-9)
 
@@ -99,7 +99,7 @@ def row(*, number=3, text=None, change=None):
 )
 def test_damage_is_named_with_its_line(damage, message, tmp_path):
     field = random_field(random_instance(1), 1)
-    path = write_field(field, tmp_path / "field.rawfield")
+    path = write_field(field, tmp_path / "field.rawfield", force=True)
     path.write_text("\n".join(damage(path.read_text().splitlines())))
     with pytest.raises(InstanceError) as caught:
         read_field(path, on=field.instance)
