@@ -62,12 +62,13 @@ def replacing(
 def temporary_folder() -> Iterator[Path]:
     """A folder for the time of the block. Raises OutputError where the disk of temporary files is full."""
     with tempfile.TemporaryDirectory(prefix="crossfield-", ignore_cleanup_errors=True) as name:
+        folder = Path(name).resolve()
         try:
-            yield Path(name).resolve()
+            yield folder
         except OSError as error:
             # A copy names its source first; a stream that is written to has no name.
-            written = error.filename2 or error.filename or name
-            if error.errno not in _FULL or not Path(written).is_relative_to(name):
+            written = Path(error.filename2 or error.filename or folder)
+            if error.errno not in _FULL or not written.is_relative_to(folder):
                 raise
             raise OutputError(
                 f"has no room for temporary files ({reason_of(error)}); free some space, or set TMPDIR to "

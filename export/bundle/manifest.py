@@ -64,8 +64,7 @@ class Manifest:
     def problems_by_format(self, problem: Problem) -> dict[str, Problem]:
         """The problem in each format, as its files hold it: the same, or with its products lifted."""
         return {
-            file["format"]: problem.with_products_lifted if file["lifted"] else problem
-            for file in self.document["files"]
+            file["format"]: problem.lifted if file["lifted"] else problem for file in self.document["files"]
         }
 
 

@@ -161,7 +161,7 @@ def problem_in_format(problem: Problem, entry: Format) -> Problem:
     if entry.degree == ANY_DEGREE or _highest_degree(problem) <= entry.degree:
         return problem
     if _highest_degree(problem) < ANY_DEGREE:
-        lifted = problem.with_products_lifted
+        lifted = problem.lifted
         if _highest_degree(lifted) <= entry.degree:
             return lifted
     instead = problem.formulation.equivalent

@@ -472,7 +472,7 @@ def _canonical_form(raw: RawSolution, problem: Problem, held: Mapping[str, Probl
         return CanonicalForm(*forms.values())
     liftable = "p1" in problem.blocks and "z" not in problem.blocks
     named = liftable and np.strings.startswith(raw.names, b"z_").any()
-    return CanonicalForm(problem.with_products_lifted if named else problem)
+    return CanonicalForm(problem.lifted if named else problem)
 
 
 def _problem_in_file(problem: Problem, name: str) -> Problem:

@@ -460,7 +460,7 @@ class Problem:
         return self.pinned is None and not self.formulation.lifted
 
     @cached_property
-    def with_products_lifted(self) -> Problem:
+    def lifted(self) -> Problem:
         """The problem with each p1 beta_i lifted to z, for formats up to quadratic.
 
         Relaxed, it is weaker (`Formulation.is_weakened`).
@@ -559,8 +559,8 @@ def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
 
 
 def with_windows(problem: Problem, windows: Windows | None) -> Problem:
-    """The same problem with narrower windows of alpha and beta and ranges of jumps; None: the gauge's.
+    """The same problem with narrower windows of alpha and beta, and narrower ranges of jumps.
 
-    Raises InstanceError for windows that are not within the windows of its gauge.
+    windows: None for those of the gauge. Raises InstanceError for windows beyond those of the gauge.
     """
     return replace(problem, windows=windows)

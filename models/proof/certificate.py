@@ -200,9 +200,9 @@ def _last_step_arrays(
 ) -> Arrays:
     """The cuts and the multipliers of the last step; none unless it has pieces.
 
-    part: the instance on the parts of its mask that have a stroke.
-
     The prover's boxes are a little larger than the checker's, so its pieces cover these as a rule.
+
+    part: the instance on the parts of its mask that have a stroke.
     """
     from .descent.last_step import fit_to_boxes, minimise_on_boxes  # loads solvers
 

@@ -77,5 +77,7 @@ def drawn_sample(
 
 def sample_svg(name: str) -> str:
     """The SVG text of a built-in sketch. Raises InputError for an unknown name and for a computed sample."""
+    if name in _COMPUTED:
+        raise InputError(f"sample {name!r} is computed, not drawn; choose one of {', '.join(_DRAWN)}")
     check_choice("drawn sample", name, _DRAWN)
     return files(__package__).joinpath("drawings", f"{name}.svg").read_text("utf-8")

@@ -1,8 +1,10 @@
 """Only files that crossfield wrote and nobody changed are replaced or removed, all together at the end."""
 
+import errno
 import os
 import subprocess
 import sys
+import tempfile
 from itertools import count
 from pathlib import Path
 
@@ -244,7 +246,18 @@ def test_temporary_files_of_other_programs_stay(tmp_path):
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is always full")
-def test_a_full_disk_of_temporary_files_is_named_with_a_remedy(tmp_path):
+@pytest.mark.parametrize("is_linked", [False, True])
+def test_a_full_disk_of_temporary_files_is_named_with_a_remedy(is_linked, tmp_path, monkeypatch):
+    """The folder of temporary files may be a link, and what a copy reads lies elsewhere."""
+    (tmp_path / "temporary").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "temporary")
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / ("link" if is_linked else "temporary")))
+
+    def copy():
+        with temporary_folder() as folder:
+            # As shutil.copyfile ends on a full disk: it names its source first.
+            raise OSError(errno.ENOSPC, "full", str(tmp_path / "source"), None, str(folder / "copy"))
+
     def write(path):
         with temporary_folder() as folder:
             (folder / "full").symlink_to("/dev/full")
@@ -252,5 +265,7 @@ def test_a_full_disk_of_temporary_files_is_named_with_a_remedy(tmp_path):
 
     with pytest.raises(OutputError, match=r"no room for temporary files.* set TMPDIR to another folder"):
         write(None)
+    with pytest.raises(OutputError, match=r"no room for temporary files"):
+        copy()
     with pytest.raises(FileNotFoundError):
         write(tmp_path / "none" / "file")

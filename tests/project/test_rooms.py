@@ -105,4 +105,4 @@ def test_the_core_passes_its_tests_without_any_room(rooms, tmp_path):
         shutil.copy(path, copy)
     for folder in ("support", "data"):
         shutil.copytree(ROOT / "tests" / folder, tmp_path / "tests" / folder)
-    print(run_python(tmp_path, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"))
+    run_python(tmp_path, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider")

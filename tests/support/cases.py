@@ -145,9 +145,10 @@ def _settle(field: CrossField) -> CrossField:
 
     steps = np.vstack([np.eye(len(roots)), -np.eye(len(roots))])
     z = np.append(field.p, np.zeros(len(instance.theta)))
-    best = z
-    while fit(best)[0] <= fit(z)[0] - 1e-9 or best is z:
-        z, best = best, min((best + step for step in steps), key=lambda each: fit(each)[0])
+    energy, lower = np.inf, z
+    while fit(lower)[0] < energy - 1e-9:
+        z, energy = lower, fit(lower)[0]
+        lower = min((z + step for step in steps), key=lambda changed: fit(changed)[0])
     pairs, line = len(field.p), np.zeros(instance.domain.size, dtype=np.int32)
     line[instance.stroke_index] = z[pairs:]
     jumps = z[:pairs].astype(np.int32)

@@ -193,7 +193,7 @@ def entries(*, rung: str | None = None) -> list[LibraryEntry]:
     Parameters
     ----------
     rung
-        Only entries of this class of sizes: `tiny`, `small`, `medium` or `large`.
+        Only entries of this class: `tiny`, `small`, `medium`, `large` or `mesh`.
 
     Returns
     -------

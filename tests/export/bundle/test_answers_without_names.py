@@ -33,9 +33,9 @@ def test_values_without_names_follow_the_file_that_the_manifest_lists(tmp_path):
     assert {name: form.sha256 == problem.sha256 for name, form in held.items()} == {
         "nl": True, "gms": True, "lp": False, "mps": False,
     }  # fmt: skip
-    point = problem.with_products_lifted.point(make_field(problem.instance))
+    point = problem.lifted.point(make_field(problem.instance))
     for file in ("lp", "mps"):
-        path = raw_of_glpk(tmp_path / "x.sol", CanonicalForm(problem.with_products_lifted), file, point)
+        path = raw_of_glpk(tmp_path / "x.sol", CanonicalForm(problem.lifted), file, point)
         for solution in (read_solution(path, problem, held=held), read_solution(path, problem)):
             np.testing.assert_array_equal(solution.point, point)
         with pytest.raises(SolutionError, match="the problem has"):

@@ -182,11 +182,11 @@ def test_documents_that_contradict_themselves_are_refused(keys, value, error, me
 
 def test_problems_that_no_manifest_records_are_refused(tmp_path):
     problem = make_problem("minlp-cubic", make_instance())
-    for other in (problem.with_products_lifted, with_integers_fixed(problem, make_field(problem.instance))):
+    for other in (problem.lifted, with_integers_fixed(problem, make_field(problem.instance))):
         with pytest.raises(InputError, match="a manifest cannot record minlp-cubic"):
             write_problem(other, tmp_path / "set")
     assert list(tmp_path.iterdir()) == []
-    write(problem.with_products_lifted, tmp_path / "single.lp")
+    write(problem.lifted, tmp_path / "single.lp")
     fixed = with_integers_fixed(problem, make_field(problem.instance))
     with pytest.raises(UnsupportedByFormatError, match="write nl, lp or mps"):
         write(fixed, tmp_path / "fixed.mod")

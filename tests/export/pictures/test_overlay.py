@@ -180,7 +180,7 @@ def test_another_drawing_and_another_kind_are_refused(tmp_path):
     with pytest.raises(InputError, match="lies elsewhere"):  # before anything is searched for
         run(field.instance, tmp_path / "run", drawing=tmp_path / "far.svg")
     assert not (tmp_path / "run").exists()
-    with pytest.raises(InputError, match="no drawn sample 'wave_sheet'; choose one of"):
+    with pytest.raises(InputError, match="computed, not drawn"):
         draw(field, tmp_path / "over.png", underlay="wave_sheet")
 
 

@@ -66,7 +66,7 @@ def test_a_point_comes_back_as_it_was(tmp_path, field, name, kind):
 @pytest.mark.parametrize("name", LIFTED)
 def test_a_file_with_lifted_products_is_mapped_onto_the_lifted_problem(tmp_path, field, name):
     problem = problem_of(field, name)
-    held = problem.with_products_lifted
+    held = problem.lifted
     path = by_name(tmp_path / "x.sol", names_of(held), held.point(field))
     solution = read_solution(path, problem)
     assert solution.problem.n_columns == held.n_columns == problem.n_columns + len(field.p)
@@ -76,7 +76,7 @@ def test_a_file_with_lifted_products_is_mapped_onto_the_lifted_problem(tmp_path,
 
 
 def test_a_cheated_product_shows_as_a_violation(tmp_path, field):
-    held = problem_of(field, "minlp-quartic").with_products_lifted
+    held = problem_of(field, "minlp-quartic").lifted
     point = held.point(field)
     cheated = held.blocks["z"].slice
     point[cheated] += 0.25

@@ -116,7 +116,7 @@ def test_a_field_is_a_feasible_point_and_comes_back(label):
 def test_lifted_problems_are_exact(name):
     """At any angles and any binary p1, with z = p1 beta, far outside of the bounds as well."""
     problem = make_problem(name, make_instance())
-    other = problem.with_products_lifted
+    other = problem.lifted
     assert (other.objective_degree, other.row_degree, other.is_convex) == (2, 1, name == "minlp-quartic")
     rng = np.random.default_rng(7)
     for point in points_of(problem):
@@ -129,7 +129,7 @@ def test_lifted_problems_are_exact(name):
     assert "hull" in other.formulation.lifted
     assert other.sha256 != problem.sha256
     relaxed = make_problem("minlp-cubic", make_instance(), relax=True)
-    assert relaxed.with_products_lifted.problem_class == "QP"
+    assert relaxed.lifted.problem_class == "QP"
 
 
 def test_convex_problems_have_positive_semidefinite_hessians():

@@ -95,7 +95,7 @@ def test_the_ring_keeps_its_hole_and_the_bend_no_end_cap():
 def test_unknown_names_are_refused_with_the_choice():
     with pytest.raises(InputError, match="no sample 'sphere'; choose one of cylinder_bend, mouse"):
         sample("sphere")
-    with pytest.raises(InputError, match="no drawn sample 'wave_sheet'; choose one of cylinder_bend"):
+    with pytest.raises(InputError, match="'wave_sheet' is computed, not drawn; choose one of cylinder_bend"):
         sample_svg("wave_sheet")
     with pytest.raises(InputError, match="size is 0"):
         sample("mouse", 0)
