@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 from crossfield.export.cli.app import app as commands
-from crossfield.export.cli.help_texts import fill_names
 from sphinx.util.docutils import SphinxDirective
 
 if TYPE_CHECKING:
@@ -53,8 +52,8 @@ def _cell(text: str) -> str:
 
 
 def _text(text: str) -> str:
-    """A help text with names from the tables."""
-    paragraphs = fill_names(text).split("\n\n")
+    """A help text, one line per paragraph."""
+    paragraphs = text.split("\n\n")
     return "\n\n".join(" ".join(paragraph.split()) for paragraph in paragraphs)
 
 

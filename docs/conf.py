@@ -19,11 +19,8 @@ from formulas import mathml, model_table
 project = "crossfield"
 author = "The crossfield authors"
 version = release = installed("crossfield")
-extensions = [
-    *("myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"),
-    *("command_pages", "csv_pages", "sample_gallery"),
-]
-exclude_patterns = ["static", "studying"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "command_pages", "csv_pages"]
+exclude_patterns = ["static"]
 source_suffix = {".md": "myst-nb"}
 
 myst_enable_extensions = ["dollarmath", "colon_fence", "deflist"]

@@ -5,7 +5,6 @@ Every figure is computed. Lines, strokes and singularities have the colours of a
 
 from __future__ import annotations
 
-import io
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -16,30 +15,48 @@ import crossfield as cf
 import matplotlib as mpl
 import numpy as np
 from crossfield.export.library.documents.statistics import problem_counts
-from crossfield.export.pictures.canvas import draw_smooth_image, paint, set_coordinates
-from crossfield.export.pictures.draw import fixed_settings
-from crossfield.export.pictures.marks import BORDER, FAINT, FAMILIES, POSITIVE, STROKE
+from crossfield.export.pictures.marks import (
+    BORDER,
+    FAINT,
+    FAMILIES,
+    PAPER,
+    POSITIVE,
+    STROKE,
+    Area,
+    ImageMark,
+    Layer,
+    Lines,
+    Mark,
+    Sheet,
+    TextMark,
+    straight_line,
+)
 from crossfield.export.pictures.panels import PanelContent, draw_surface
 from crossfield.export.pictures.streamlines import align_labels
+from crossfield.export.pictures.svg import render_sheet, sheet_svg
 from crossfield.export.pictures.underlay import Underlay, read_underlay
-from crossfield.export.shading.colours import shade_by_light
+from crossfield.export.shading.colours import shade_by_light, to_eight_bit
 from crossfield.export.shading.raster import grid_box, raster, view_of_grid
 from crossfield.export.surfaces.files import draw_strokes
 from crossfield.export.surfaces.outline import find_outline
 from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
-from crossfield.models.formulations.catalogue import FORMULATIONS, declare
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.formulations.choice import declare
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
 from crossfield.models.smooth.polyvector import HOLDS
 from matplotlib.figure import Figure
 from PIL import Image
+from plots import fixed_settings
 
 U, V = FAMILIES
 GREY, FILL = "#7a7a7a", "#dfe9f5"
 STYLE: Final = {"font.family": "DejaVu Sans"}
 PAGE: Final = 340.0
 """Points of the width of a picture of docs/cross-field.md, whose words stay legible on a phone."""
+TEXT, SCALE = 13.0, 110 / 72
+"""Points of words in pictures of the same page, and dots per point of thumbnails."""
 CLOSE: Final = 68.0
 """Points of a pixel in the picture of the singularity."""
 SIZED: Final = ("mouse", 24)
@@ -58,14 +75,6 @@ def line(axes: Any, angle: float, colour: str, name: str = "", at: tuple[float, 
     axes.text(*(np.array(at) + 1.22 * step), name, color=colour, ha="center", va="center")
 
 
-def arc(axes: Any, begin: float, end: float, radius: float, name: str) -> None:
-    """An angle with its name."""
-    angles = np.linspace(begin, end, 60)
-    axes.plot(radius * np.cos(angles), radius * np.sin(angles), color=GREY, linewidth=1.2)
-    middle = (begin + end) / 2
-    axes.text(1.6 * radius * np.cos(middle), 1.6 * radius * np.sin(middle), name, ha="center", va="center")
-
-
 def bare(axes: Any, title: str, *, equal: bool = True) -> None:
     """Remove frame and ticks."""
     axes.set_axis_off()
@@ -74,23 +83,20 @@ def bare(axes: Any, title: str, *, equal: bool = True) -> None:
         axes.set_aspect("equal")
 
 
+def bend_field_of(instance: Instance) -> CrossField:
+    """The field of the method `bend`."""
+    return cf.bend_field(cf.polyvector_field(instance, hold=max(HOLDS)))
+
+
 @cache
 def mouse(size: int) -> CrossField:
     """The bend field of the sample `mouse`."""
-    return cf.bend_field(cf.polyvector_field(cf.sample("mouse", size), hold=max(HOLDS)))
+    return bend_field_of(cf.sample("mouse", size))
 
 
-def panel(
-    figure: Figure, field: CrossField, width: float, top: float = 0.0, left: float = 0.0
-) -> tuple[Any, PanelContent]:
-    """Axes in a figure, in points, y down, and a panel of that width, with margins above and to the left."""
-    content = PanelContent(field.instance, field, width)
-    page = 72 * figure.get_size_inches()
-    high = content.unit * field.instance.grid.height
-    axes = figure.add_axes((left / page[0], 1 - (top + high) / page[1], width / page[0], high / page[1]))
-    set_coordinates(axes, 0.0, 0.0, width, high)
-    axes.set_clip_on(False)
-    return axes, content
+def panel(field: CrossField, width: float, left: float = 0.0, top: float = 0.0) -> PanelContent:
+    """A panel of that width, in points, y down, with margins to the left and above."""
+    return PanelContent(field.instance, field, width, corner=(left, top))
 
 
 def drawing_of(instance: Instance, drawing: str | Path | None) -> Underlay:
@@ -102,70 +108,96 @@ def drawing_of(instance: Instance, drawing: str | Path | None) -> Underlay:
     return Underlay(grid_box(instance), {"red": np.split(segments, breaks)}, ("", ""), None)
 
 
-def draw_drawing(axes: Any, content: PanelContent, drawing: Underlay) -> None:
+def draw_drawing(content: PanelContent, drawing: Underlay) -> Mark:
     """The drawing from which the instance of a panel was read."""
     view = view_of_grid(content.instance, round(2 * content.unit))
-    draw_smooth_image(axes, draw_strokes(content.instance, drawing, view), content.extent)
+    return ImageMark(content.box, draw_strokes(content.instance, drawing, view))
 
 
-def strokes(figure: Figure) -> None:
+def strokes() -> list[Mark]:
     """The drawing, and its stroke pixels, each with its direction."""
-    axes, content = panel(figure, mouse(20), PAGE)
+    content = panel(mouse(20), PAGE)
     frame = content.frame
-    draw_drawing(axes, content, drawing_of(content.instance, "mouse"))
-    paint(axes, [frame.sides("#e4e4e4", 0.6, between=True), frame.sides(BORDER, 0.9)])
-    paint(axes, frame.strokes(STROKE, 3.0))
+    drawing = draw_drawing(content, drawing_of(content.instance, "mouse"))
+    sides = [frame.sides("#e4e4e4", 0.6, between=True), frame.sides(BORDER, 0.9)]
+    return [drawing, *sides, *frame.strokes(STROKE, 3.0)]
 
 
-def front(figure: Figure) -> None:
+def front() -> list[Mark]:
     """The row of the mouse, for README and home page."""
-    draw_row(figure, mouse(48), "mouse")
+    return draw_row(mouse(48), "mouse")
 
 
-def draw_row(figure: Figure, field: CrossField, drawing: str | Path | None) -> None:
+def draw_row(field: CrossField, drawing: str | Path | None) -> list[Mark]:
     """A drawing, the lines of its field, and the surface, without words. drawing: as in `drawing_of`."""
-    width, pitch = 0.64 * PAGE, 0.68 * PAGE
-    panels = [panel(figure, field, width, 4, number * pitch) for number in range(3)]
-    (strokes_of, content), (lines, _), (shape, _) = panels
-    instance, strokes = field.instance, drawing_of(field.instance, drawing)
-    draw_drawing(strokes_of, content, strokes)
-    paint(lines, content.frame.streamlines(field, 1.1, 7.0))
-    paint(lines, content.frame.singularities(field, 3.0))
-    outline = find_outline(instance, strokes) if drawing else None
-    view = view_of_grid(instance, round(2 * content.unit))
-    shaded = raster(instance, cf.surface(field).normals, view, outline=outline)
-    draw_smooth_image(shape, shade_by_light(shaded), content.extent)
+    contents = [panel(field, 0.64 * PAGE, number * 0.68 * PAGE, 4.0) for number in range(3)]
+    instance, lines = field.instance, contents[1].frame
+    strokes_of = drawing_of(instance, drawing)
+    outline = find_outline(instance, strokes_of) if drawing else None
+    view = view_of_grid(instance, round(2 * contents[2].unit))
+    shaded = shade_by_light(raster(instance, cf.surface(field).normals, view, outline=outline))
+    return [
+        draw_drawing(contents[0], strokes_of),
+        *lines.streamlines(field, 1.1, 7.0),
+        *lines.singularities(field, 3.0),
+        ImageMark(contents[2].box, to_eight_bit(shaded)),
+    ]
 
 
 def draw_thumbnail(field: CrossField, drawing: str | Path | None, path: Path) -> None:
     """Draw a row as a PNG; the longer side of each grid has the same length."""
     height = 0.64 * PAGE * field.instance.grid.height / max(field.instance.mask.shape) + 8
-    with fixed_settings(STYLE):
-        figure = Figure(figsize=(2 * PAGE / 72, height / 72))
-        draw_row(figure, field, drawing)
-        stream = io.BytesIO()
-        figure.savefig(stream, dpi=110, metadata={"Software": None})
-    with Image.open(stream) as picture:
-        picture.convert("RGB").quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+    save_thumbnail([page_of(draw_row(field, drawing), 2 * PAGE, height)], path, 256)
 
 
-def crosses(figure: Figure) -> None:
+def save_thumbnail(sheets: list[Sheet], path: Path, colours: int) -> None:
+    """Save sheets side by side as a PNG with a palette."""
+    sizes = [[round(SCALE * side) for side in sheet.page[2:]] for sheet in sheets]
+    rendered = [render_sheet(sheet, *size) for sheet, size in zip(sheets, sizes, strict=True)]
+    picture = Image.fromarray(np.hstack(rendered)).convert("RGB")
+    picture.quantize(colours, dither=Image.Dither.NONE).save(path, optimize=True)
+
+
+def page_of(marks: list[Mark], width: float, height: float) -> Sheet:
+    """White paper with marks on it."""
+    page = (0.0, 0.0, width, height)
+    return Sheet(page, (Layer("", (Area(PAPER, np.array([page])), *marks)),))
+
+
+def polyline(colour: str, width: float, *points: Any) -> Lines:
+    """A line through points (x, y)."""
+    return Lines(colour, width, [straight_line(np.array(points))])
+
+
+def crosses() -> list[Mark]:
     """A cross at every pixel, and the two angles of one."""
-    axes, content = panel(figure, mouse(20), 0.6 * PAGE, 16)
-    paint(axes, content.frame.strokes(FAINT, 3.0))
-    paint(axes, content.frame.crosses(content.crosses, 1.5))
-    single = figure.add_axes((0.59, 0.0, 0.41, 1.0))
-    bare(single, "")
+    content = panel(mouse(20), 0.6 * PAGE, 0.0, 16.0)
+    centre, scale = np.array([0.59 * PAGE + 62, 115.0]), 124.0
+
+    def at(angle: float, radius: float) -> Any:
+        return centre + scale * radius * np.array([np.cos(angle), -np.sin(angle)])
+
     alpha, beta = np.radians(24), np.radians(20)
-    single.plot([-0.3, 0.55], [0, 0], color=GREY, linewidth=0.9)
-    for angle in (alpha, alpha + HALF):
-        single.plot([0, 0.52 * np.cos(angle)], [0, 0.52 * np.sin(angle)], color=GREY, lw=1, linestyle="--")
-    line(single, alpha + beta, U, "u")
-    line(single, alpha + HALF - beta, V, "v")
-    arc(single, 0, alpha, 0.24, "α")
-    arc(single, alpha, alpha + beta, 0.24, "β")
-    arc(single, alpha + HALF - beta, alpha + HALF, 0.24, "β")
-    single.set(xlim=(-0.5, 0.62), ylim=(-0.5, 0.62))
+    marks: list[Mark] = [*content.frame.strokes(FAINT, 3.0), *content.frame.crosses(content.crosses, 1.5)]
+    marks.append(polyline(GREY, 0.9, at(0, -0.3), at(0, 0.55)))
+    marks += [polyline(GREY, 1.0, at(angle, 0), at(angle, 0.52)) for angle in (alpha, alpha + HALF)]
+    for angle, colour, name in ((alpha + beta, U, "u"), (alpha + HALF - beta, V, "v")):
+        marks.append(polyline(colour, 2.6, at(angle, -0.42), at(angle, 0.42)))
+        marks.append(word(name, at(angle, 0.51), colour))
+    for begin, end, name in (
+        (0, alpha, "α"),
+        (alpha, alpha + beta, "β"),
+        (alpha + HALF - beta, alpha + HALF, "β"),
+    ):
+        marks.append(polyline(GREY, 1.2, *(at(angle, 0.24) for angle in np.linspace(begin, end, 20))))
+        marks.append(word(name, at((begin + end) / 2, 0.384)))
+    return marks
+
+
+def word(text: str, middle: Any, colour: str = "#000000") -> TextMark:
+    """A word with its middle at a place (x, y)."""
+    x, y = middle.tolist()
+    return TextMark(text, (x, y + 0.35 * TEXT), TEXT, colour)
 
 
 def jump(figure: Figure) -> None:
@@ -185,34 +217,32 @@ def jump(figure: Figure) -> None:
     axes.set(xlim=(-0.65, 2.45), ylim=(-0.9, 0.64))
 
 
-def singularity(figure: Figure) -> None:
+def singularity() -> list[Mark]:
     """The crosses round a singularity, and the jumps between the four next to it."""
     field = align_labels(mouse(20))
-    grid, singular = field.instance.grid, field.singularities
-    axes, content = panel(figure, field, CLOSE * grid.width)
-    paint(axes, content.frame.crosses(field, 2.6))
-    paint(axes, content.frame.singularities(field, 6.0))
-    for pair in grid.quads[singular.ring[0]]:
+    grid, ring = field.instance.grid, field.singularities.ring[0]
+    middle = panel(field, CLOSE * grid.width).frame.at(
+        np.array([field.singularities.column[0] + 0.5, -field.singularities.row[0] - 0.5])
+    )
+    _, width, height = SHEETS["first_singularity"]
+    frame = panel(field, CLOSE * grid.width, *(np.array([width, height]) / 2 - middle).tolist()).frame
+    marks: list[Mark] = [*frame.crosses(field, 2.6), *frame.singularities(field, 6.0)]
+    for pair in grid.quads[ring]:
         ends = np.array([(grid.columns[k], -grid.rows[k]) for k in (grid.first[pair], grid.second[pair])])
-        points = content.frame.at(ends)
-        axes.plot(*points.T, color=GREY, linewidth=1.2, linestyle=":")
-        words, box = (
-            f"{field.p[pair]}".replace("-", "−"),
-            {"facecolor": "white", "edgecolor": "none", "pad": 2.0},
-        )
-        axes.text(*points.mean(axis=0), words, ha="center", va="center", bbox=box)
-    centre = content.frame.at(np.array([singular.column[0] + 0.5, -singular.row[0] - 0.5]))
-    axes.set_position((0.0, 0.0, 1.0, 1.0))
-    half = 36 * figure.get_size_inches()
-    set_coordinates(axes, *(centre - half), *(2 * half))
+        points = frame.at(ends)
+        (x, y), text = points.mean(axis=0).tolist(), f"{field.p[pair]}".replace("-", "−")
+        marks.append(polyline(GREY, 1.2, *points))
+        marks.append(Area(PAPER, np.array([[x - 9, y - 8, x + 9, y + 8]])))
+        marks.append(word(text, np.array([x, y])))
+    return marks
 
 
-def surface(figure: Figure) -> None:
+def surface() -> list[Mark]:
     """The surface, with the lines of the field on it."""
     field = mouse(48)
-    axes, content = panel(figure, field, PAGE)
-    draw_surface(axes, replace(content, surface=cf.surface(field)))
-    paint(axes, content.frame.streamlines(field, 1.2, 14.0))
+    content = panel(field, PAGE)
+    shaded = draw_surface(replace(content, surface=cf.surface(field)))
+    return [*shaded, *content.frame.streamlines(field, 1.2, 14.0)]
 
 
 def strip(figure: Figure) -> None:
@@ -327,7 +357,8 @@ def sizes(figure: Figure) -> None:
     rows = {name: count_parts(name) for name in FORMULATIONS}
     most = np.max(list(rows.values()), axis=0)
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-    set_coordinates(axes, 0.0, 0.0, PAGE, ROW * (len(rows) + 2))
+    axes.set(xlim=(0, PAGE), ylim=(ROW * (len(rows) + 2), 0))
+    axes.set_axis_off()
     for place, title in zip(COLUMNS, ("columns", "rows", "integers", "nonlinear\nterms"), strict=True):
         axes.text(place, 1.2 * ROW, title, ha="left", va="bottom", fontsize=10)
     for number, (name, counts) in enumerate(rows.items()):
@@ -357,13 +388,16 @@ def count_parts(name: str) -> tuple[int, int, int, int]:
     return problem.n_columns, problem.n_rows, int(problem.integer.sum()), terms
 
 
+SHEETS: Final[dict[str, tuple[Callable[[], list[Mark]], float, float]]] = {
+    "front": (front, 2 * PAGE, 191.0),
+    "first_strokes": (strokes, PAGE, 290.0),
+    "first_crosses": (crosses, PAGE, 202.0),
+    "first_singularity": (singularity, PAGE, 274.0),
+    "first_surface": (surface, PAGE, 284.0),
+}
+"""File -> function that returns the marks, width and height in points."""
 FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float, float]]] = {
-    "front": (front, 2 * PAGE / 72, 2.65, 13),
-    "first_strokes": (strokes, PAGE / 72, 4.03, 13),
-    "first_crosses": (crosses, PAGE / 72, 2.8, 13),
     "first_jump": (jump, PAGE / 72, 2.35, 13),
-    "first_singularity": (singularity, PAGE / 72, 3.8, 13),
-    "first_surface": (surface, PAGE / 72, 3.95, 13),
     "formulation_sizes": (sizes, PAGE / 72, 15 * ROW / 72, 10),
     "math_strip": (strip, PAGE / 72, 5.4, 11),
     "math_facets": (facets, PAGE / 72, 2.5, 10),
@@ -374,6 +408,8 @@ FIGURES: Final[dict[str, tuple[Callable[[Figure], None], float, float, float]]] 
 
 def draw(folder: Path) -> None:
     """Write every figure as SVG, with equal bytes each time."""
+    for name, (marks_of, wide, high) in SHEETS.items():
+        (folder / f"{name}.svg").write_bytes(sheet_svg(page_of(marks_of(), wide, high)))
     for name, (paint_figure, width, height, points) in FIGURES.items():
         with fixed_settings(STYLE | {"font.size": points}):
             figure = Figure(

@@ -1,7 +1,4 @@
-"""Make the generated pages and pictures of docs/, or one of them by name: `python docs/make.py`.
-
-The tables state sizes, seeds and time limits. Other pages have programs of their own (CONTRIBUTING.md).
-"""
+"""Make the generated pages and pictures of docs/, or one of them by name: `python docs/make.py`."""
 
 from __future__ import annotations
 
@@ -13,20 +10,20 @@ import shutil
 import sys
 import tempfile
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import crossfield as cf
-import numpy as np
-from crossfield.export.cli.mesh_options import SKETCHES_ONLY
-from crossfield.export.solvers_table import PROGRAMS
+from crossfield.export.bundle.starts import STARTS
+from crossfield.export.cli.tables import smallest_problems
+from crossfield.export.solvers_table import PROGRAMS, SOLVERS, suitability
 from crossfield.models.errors import InputError
-from crossfield.models.formulations.catalogue import A_WHOLE, FORMULATIONS, declare
+from crossfield.models.formulations.catalogue import A_WHOLE, FORMULATIONS
+from crossfield.models.formulations.choice import declare
 from crossfield.models.formulations.latex import aligned, domain, expression, objective_and_rows
+from crossfield.models.formulations.problem import Problem
 from crossfield.models.formulations.symbols import VARIABLES, A, B, R, beta, kappa, p1, p2
-from crossfield.models.instance.instance import GAUGES, Gauge, Instance
-from crossfield.models.instance.symmetries import turned
 
 DOCS = Path(__file__).resolve().parent
 
@@ -45,6 +42,17 @@ def csv_text(rows: list[dict[str, Any]]) -> str:
     writer.writeheader()
     writer.writerows(rows)
     return buffer.getvalue()
+
+
+def write_rows(path: str, rows: list[dict[str, Any]]) -> None:
+    """Write rows to a CSV file of docs/."""
+    (DOCS / path).write_text(csv_text(rows), encoding="utf-8")
+
+
+def read_rows(path: str) -> list[dict[str, str]]:
+    """The rows of a CSV file of docs/."""
+    with (DOCS / path).open(newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
 
 
 def generated_line(command: str) -> str:
@@ -73,7 +81,24 @@ def write_formulations() -> None:
         optima.setdefault(recipe.minimises, []).append(f"`{name}`")
     equal = "\n".join(f"- {energy}: {', '.join(names)}" for energy, names in optima.items() if names[1:])
     parts += ["## Formats and solvers", EQUAL, equal, SUPPORT]
+    parts += ["## Differences from the paper", DIFFERENCES, misprints()]
     (DOCS / "formulations.md").write_text("\n\n".join(parts) + "\n")
+    write_rows("formulations/solvers.csv", list(map(solvers_of, smallest_problems())))
+    write_rows("formulations/refusals.csv", list(refusals()))
+
+
+def solvers_of(problem: Problem) -> dict[str, str]:
+    """The solvers that take a formulation."""
+    return {"formulation": problem.name} | {
+        solver.title: suitability(problem, name).answer for name, solver in SOLVERS.items()
+    }
+
+
+def refusals() -> Iterator[dict[str, str]]:
+    """The reasons for which solvers do not take a formulation, or answer without proof."""
+    for solver in SOLVERS.values():
+        for trait, refusal in solver.refusals.items():
+            yield {"solver": solver.title, "trait": trait, "reason": refusal.reason}
 
 
 def options_of(name: str) -> str:
@@ -136,7 +161,7 @@ and numbers in brackets are the paper's. Sizes for the sketch `mouse` at 24 pixe
 
 SYMBOLS = rf"""[The mathematics](mathematics.md) defines the pixels $I$, the stroke pixels $S_c$ with
 $\theta_i$ and $w_i$, the pairs $E$, and the [windows](mathematics.md#4-gauges-and-windows) of $\alpha$, from
-which $p^{{\min}}$ and $p^{{\max}}$ follow. $C$ is a basis of the [cycles](cycles.md#residuals-and-cycles) of
+which $p^{{\min}}$ and $p^{{\max}}$ follow. $C$ is a basis of the [cycles](mathematics.md#13-cycles) of
 pairs and strokes. $H_c$ is the sum of the turns $\pm\kappa_{{ij}}$ along a cycle, plus $\theta_i - \theta_j$
 for a walk from stroke to stroke. Between pixels, $\kappa_{{ij}} = 0$.
 
@@ -146,8 +171,10 @@ Expressions:
 
 Options:
 
-- `limits` replaces $d^{{\max}} = q^{{\max}} = \pi/4$ by [smaller ones](cycles.md#limits-of-residuals), which
-  cut off no optimum.
+- `limits` replaces $d^{{\max}} = q^{{\max}} = \pi/4$ by
+  [smaller ones](mathematics.md#14-limits-of-residuals), which cut off no optimum.
+- `indices` fixes $k_c$ along the rings of some vertices of a mesh, and so
+  [the index there](mathematics.md#12-surfaces), among fields whose residuals are at most $\pi/4$.
 - `facet=printed` replaces row (26) by the paper's bound $z \ge -\pi/4$.
 - `stroke_norm` and `beta_norm`, 1 or 2, are the indices of $\text{{strokes}}$ and $\text{{skew}}$.
 - `relax` makes integers continuous, except in `qp-fixed`.
@@ -158,116 +185,35 @@ EQUAL = "These minimise the same, and points carry over by name:"
 
 SUPPORT = """`.nl` and GAMS files hold every formulation, and LP and MPS files all except `minlp-parity`. They
 hold `minlp-quartic` and `minlp-cubic` *lifted*: each product of an integer and a continuous variable becomes
-one column and four rows, without loss unless relaxed. [solvers.csv](validation/solvers.csv) states which
-solver takes which formulation."""
+one column and four rows, without loss unless relaxed. [solvers.csv](formulations/solvers.csv) states which
+solver takes which formulation (`local`: it answers without proof), and
+[refusals.csv](formulations/refusals.csv) why one does not."""
 
 
-def random_instance(height: int, width: int, seed: int, gauge: Gauge = "strokes") -> Instance:
-    """A full grid with a random direction on about two pixels in five."""
-    random = np.random.default_rng(seed)
-    mask = np.ones((height, width), dtype=bool)
-    pixels = np.argwhere(random.random(mask.shape) < 0.4)
-    return Instance.on_pixels(
-        f"random_{seed}",
-        mask,
-        pixels,
-        random.uniform(0, np.pi, len(pixels)),
-        np.ones(len(pixels)),
-        gauge=gauge,
-    )
+DIFFERENCES = """\
+- (26) reads z >= -pi/4; here it is z >= -(pi/4) p1, a facet (`export --facet printed`: as printed).
+- (1) restricts alpha to [0, pi/2]; here [windows](mathematics.md#4-gauges-and-windows) of strokes are centred
+  on their direction (`instance --gauge box`: as printed).
+- w_beta is in (6) and in the total, and missing in (21); here it counts once.
+- There are gamma rows for all pixels; here only for stroke pixels, where theta exists.
+- p2 may be any integer; here it has bounds, which contain every optimum."""
 
 
-def optimum(instance: Instance, name: str, **options: Any) -> cf.Solution:
-    """The solution of a formulation, started at the greedy baseline."""
-    return cf.solve(
-        cf.formulate(instance, name, **options), start=cf.greedy_field(instance), limits=cf.Limits(120.0)
-    )
-
-
-ERRATA = (
-    (
-        "(26) reads z >= -pi/4",
-        "z >= -(pi/4) p1, a facet; the MILP is then exact for the 1-norm",
-        "`export --facet printed`",
-    ),
-    (
-        "(1) restricts alpha to [0, pi/2]: a stroke at 120 degrees forces a skew of 30 degrees",
-        "the window of alpha is centred on the stroke's direction",
-        "`instance --gauge box`",
-    ),
-    ("w_beta is in (6) and in the total, and missing in (21)", "it counts once", ""),
-    ("gamma rows for all pixels", "gamma rows for stroke pixels, where theta exists", ""),
-    (
-        "p2 may be any integer",
-        "p2 has bounds, which contain every optimum",
-        "",
-    ),
-)
-"""Differences from the paper: as printed, as it is here, and the option that gives the printed form."""
-
-
-def write_errata() -> None:
-    """Write docs/errata.md and its tables: the effect of the paper's misprints on the optimum, in numbers."""
-    facets = []
-    for seed in range(3):
-        for facet in ("hull", "printed"):
-            solution = optimum(random_instance(4, 4, seed), "milp-mccormick", facet=facet)
-            energy = solution.field.energy(1).total
-            values = {"optimum": f"{solution.objective:.6f}", "energy of its field": f"{energy:.6f}"}
-            facets.append({"seed": seed, "facet": facet, **values, "status": str(solution.status)})
-    gauges = []
-    for seed in range(1, 4):
-        for gauge in GAUGES:
-            instance = random_instance(2, 3, seed, gauge)
-            both = [optimum(moved, "miqp-exact") for moved in (instance, turned(instance))]
-            values = [f"{solution.objective:.6f}" for solution in both]
-            facts = {"seed": seed, "gauge": gauge, "optimum": values[0], "rotated sketch": values[1]}
-            states = [solution.message.split(": ")[1].split()[0] for solution in both]
-            gauges.append({**facts, "status of Bonmin": " / ".join(states)})
-    single = Instance.on_pixels(
-        "single", np.ones((1, 1), bool), np.array([[0, 0]]), np.array([2 * np.pi / 3]), np.ones(1)
-    )
-    angles = {}
-    for gauge in GAUGES:
-        field = cf.solve(cf.formulate(single.with_gauge(gauge), "qp-fixed", p=np.zeros(0, np.int32))).field
-        angles[gauge] = f"{np.degrees(field.angle_between[0]):.0f}"
-    (DOCS / "errata" / "facets.csv").write_text(csv_text(facets))
-    (DOCS / "errata" / "gauges.csv").write_text(csv_text(gauges))
-    text = f"""# Errata of the paper
-
-{generated_line("python docs/make.py errata")}
-
-{markdown(("in the paper", "in crossfield", "option for the printed form"), list(map(list, ERRATA)))}
-
-{misprints_in_short(facets, gauges, angles)}
-"""
-    (DOCS / "errata.md").write_text(text)
-
-
-def misprints_in_short(
-    facets: list[dict[str, Any]], gauges: list[dict[str, Any]], angles: dict[str, str]
-) -> str:
-    """The effects of both misprints, from the rows of their tables and the angles at a single stroke."""
-    optima = {(row["seed"], row["facet"]): float(row["optimum"]) for row in facets}
-    energies = {(row["seed"], row["facet"]): float(row["energy of its field"]) for row in facets}
-    seeds = sorted({seed for seed, _ in optima})
-    lower = [seed for seed in seeds if optima[seed, "printed"] < optima[seed, "hull"] - 1e-6]
-    worst = max(energies[seed, "printed"] / optima[seed, "hull"] for seed in seeds)
-    values = {
-        (row["seed"], row["gauge"]): (float(row["optimum"]), float(row["rotated sketch"])) for row in gauges
-    }
-    sketches = sorted({seed for seed, _ in values})
-    higher = sum(values[seed, "box"][0] > values[seed, "strokes"][0] + 1e-4 for seed in sketches)
-    changed = sum(abs(values[seed, "box"][0] - values[seed, "box"][1]) > 1e-4 for seed in sketches)
-    return f"""**(26) as printed.** HiGHS proves the optima of `milp-mccormick` on {len(seeds)} grids of 4 x 4
-pixels with random strokes ([facets.csv](errata/facets.csv)). With the printed facet, the optimum is too
-low in {len(lower)} of them, and its field has up to {worst:.1f} times the minimum 1-norm energy. For p1 = 0,
-z is free in an interval, so the model underestimates the change of skew.
-
-**The box (1).** Bonmin solves `miqp-exact` on {len(sketches)} grids of 2 x 3 pixels
-([gauges.csv](errata/gauges.csv)). With the paper's box, the optimum is higher in {higher} of them, and a
-rotation by 90 degrees changes it in {changed}. At a single stroke of 120 degrees, the lines of the cross are
-{angles["box"]} degrees apart with the box, and {angles["strokes"]} with a window around the stroke."""
+def misprints() -> str:
+    """The effects of both misprints, from the rows of their tables."""
+    facets, gauges = (read_rows(f"formulations/{name}.csv") for name in ("facets", "gauges"))
+    energy = {(row["seed"], row["facet"]): float(row["energy of its field"]) for row in facets}
+    optimum = {(row["seed"], row["facet"]): float(row["optimum"]) for row in facets}
+    seeds = dict.fromkeys(seed for seed, _ in optimum)
+    lower = sum(optimum[seed, "printed"] < optimum[seed, "hull"] - 1e-6 for seed in seeds)
+    worst = max(energy[seed, "printed"] / optimum[seed, "hull"] for seed in seeds)
+    boxes = [row for row in gauges if row["gauge"] == "box"]
+    changed = sum(row["optimum"] != row["rotated sketch"] for row in boxes)
+    return f"""With the printed facet, the optimum is too low on {lower} of {len(seeds)} random grids of 4 x 4
+pixels, and its field has up to {worst:.1f} times the minimum 1-norm energy: where p1 = 0, z is free in an
+interval ([facets.csv](formulations/facets.csv)). With the box, a rotation by 90 degrees changes the optimum
+of {changed} of {len(boxes)} random grids of 2 x 3 pixels ([gauges.csv](formulations/gauges.csv)). HiGHS and
+Bonmin proved these optima (`python docs/make.py errata` at commit b7f5b0ee)."""
 
 
 def write_gallery() -> None:
@@ -279,7 +225,7 @@ def write_gallery() -> None:
 
 def draw_tutorials() -> None:
     """Draw the fields and the surface of docs/tutorials/solver.md and drawing.md."""
-    from surface import field_by
+    from diagrams import bend_field_of
 
     problem, pictures = cf.formulate(cf.sample("ellipsoid", 7), "milp-mccormick"), DOCS / "pictures"
     milp = cf.solve(problem, solver="highs").field
@@ -288,43 +234,17 @@ def draw_tutorials() -> None:
     with tempfile.TemporaryDirectory() as name:
         drawing = Path(name) / "pebble.svg"
         drawing.write_text(re.findall(r"```xml\n(.*?)```", page, re.DOTALL)[0])
-        field = field_by("bend", cf.read_sketch(drawing, size=48))
+        field = bend_field_of(cf.read_sketch(drawing, size=48))
         cf.draw(field, pictures / "pebble_field.png", kind="overview", force=True)
         cf.write_surface(cf.surface(field), name, drawing=drawing, side=1000)
         shutil.copy(Path(name) / "overlay.png", pictures / "pebble_surface.png")
 
 
-DRAWINGS = """Each drawing is written as the named program writes it, and has something that is easily
-misread. Most show the same body, a black outline and two red lines, and have this right answer on the grid;
-others stand beside their drawings:
-
-![The mask in grey, and two coloured lines]({answer})
-
-Grey is the mask, and the colour of a line its direction. [drawings.csv](drawings/drawings.csv) has options
-and messages of `crossfield instance`."""
-USUAL = "leaf"
-"""The right answer of most drawings."""
-
-
 def write_drawings() -> None:
-    """Write docs/drawings.md, drawings of many programs, and docs/drawings/drawings.csv, what is reported."""
+    """Write docs/guides/drawings.csv: what `crossfield instance` reports of drawings of many programs."""
     folder = DOCS.parent / "tests" / "data" / "drawings"
-    where = f"../{folder.relative_to(DOCS.parent).as_posix()}"
-    table = tomllib.loads((folder / "drawings.toml").read_text())
-    text = DRAWINGS.format(answer=f"{where}/expected/{USUAL}.png")
-    parts = ["# Drawings of many programs", generated_line("python docs/make.py drawings"), text]
-    for kind, title in table["kinds"].items():
-        lines = []
-        for row in (row for row in table["drawing"] if row["kind"] == kind):
-            line = row["shows"] + f" ({row['program']})" * (row["program"] != "browser")
-            if "picture" in row:
-                other = f"![answer]({where}/expected/{row['picture']}.png) " * (row["picture"] != USUAL)
-                line = f"![{row['file']}]({where}/{row['file']}) {other}{line}"
-            lines.append(f"- {line}")
-        parts += [f"## {title}", "\n".join(lines)]
-    (DOCS / "drawings.md").write_text("\n\n".join(parts) + "\n")
-    rows = [drawing_row(folder, row) for row in table["drawing"]]
-    (DOCS / "drawings" / "drawings.csv").write_text(csv_text(rows))
+    table = tomllib.loads((folder / "drawings.toml").read_text())["drawing"]
+    write_rows("guides/drawings.csv", [drawing_row(folder, row) for row in table])
 
 
 def drawing_row(folder: Path, row: dict[str, Any]) -> dict[str, str]:
@@ -341,13 +261,19 @@ def drawing_row(folder: Path, row: dict[str, Any]) -> dict[str, str]:
     return {**facts, "options": set_by, "reported": reported}
 
 
-def write_editions() -> None:
-    """Replace the limits of free editions inside docs/guides/solvers.md."""
-    rows = [
-        [program.title, f"`{program.install}`", program.free] for program in PROGRAMS.values() if program.free
+def write_programs() -> None:
+    """Replace the table of programs and the list of starts inside docs/guides/solvers.md."""
+    rows = read_rows("guides/solvers/programs.csv")
+    programs = {program.title: program for program in PROGRAMS.values()}
+    cells = [
+        [row["program"], f"`{program.install}`", row["version"], row["agree"], program.free]
+        for row in rows
+        for program in [programs[row["program"]]]
     ]
-    table = markdown(("program", "installation", "largest model of the free edition"), rows)
-    replace_between(DOCS / "guides" / "solvers.md", "editions", table)
+    heads = ("program", "installation", "version", "files read as meant", "largest model of the free edition")
+    replace_between(DOCS / "guides" / "solvers.md", "programs", markdown(heads, cells))
+    starts = (f"- {SOLVERS[name].title}: `{start.use}`" for name, start in STARTS.items())
+    replace_between(DOCS / "guides" / "solvers.md", "starts", "\n".join(starts))
 
 
 def write_claims() -> None:
@@ -362,25 +288,41 @@ def draw_figures() -> None:
     diagrams.draw(DOCS / "pictures")
 
 
-def write_traps() -> None:
-    """Write docs/format-rules/traps.csv, the results of the installed programs, and their numbers."""
-    import traps as files
+def write_studies() -> None:
+    """Replace the numbers of finished studies in their pages, from the CSV files beside them."""
+    import studies
 
-    rows = files.table()
-    with files.RESULTS.open("w", newline="", encoding="utf-8") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)
-    replace_between(DOCS / "format-rules.md", "traps", markdown(*files.summary(*rows)))
+    for page, name, text in studies.texts():
+        replace_between(DOCS / page, name, text)
+
+
+def write_library() -> None:
+    """Replace the counts of the library that ships in docs/library.md and docs/guides/libraries.md."""
+    import shipped_library
+
+    shipped_library.replace_counts()
+
+
+def draw_proof() -> None:
+    """Draw docs/pictures/proof_levels.png."""
+    import proof_pictures
+
+    proof_pictures.draw_levels()
+
+
+def draw_surfaces() -> None:
+    """Draw the pictures of docs/surface.md."""
+    import surface_pictures
+
+    surface_pictures.draw_pictures()
 
 
 def write_architecture() -> None:
-    """Write docs/architecture.svg, its tables, and the commands by domain, as they are now."""
+    """Write docs/architecture.svg and its table, as they are now."""
     import rooms
 
     (DOCS / "architecture.svg").write_text(rooms.picture(DOCS.parent))
     (DOCS / "architecture" / "rooms.csv").write_text(csv_text(rooms.table(DOCS.parent)))
-    some = ", ".join(f"`{command}`" for command in SKETCHES_ONLY)
-    text = f"Every command takes sketches and meshes, except these, which take sketches only: {some}."
-    replace_between(DOCS / "architecture.md", "domains", text)
 
 
 def replace_between(page: Path, name: str, text: str) -> None:
@@ -391,15 +333,17 @@ def replace_between(page: Path, name: str, text: str) -> None:
 
 PAGES: dict[str, Callable[[], None]] = {
     "formulations": write_formulations,
-    "errata": write_errata,
     "gallery": write_gallery,
     "drawings": write_drawings,
     "tutorials": draw_tutorials,
     "figures": draw_figures,
-    "traps": write_traps,
+    "surfaces": draw_surfaces,
+    "proof": draw_proof,
     "architecture": write_architecture,
-    "editions": write_editions,
+    "programs": write_programs,
     "claims": write_claims,
+    "library": write_library,
+    "studies": write_studies,
 }
 
 

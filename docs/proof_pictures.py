@@ -1,21 +1,26 @@
-"""The picture of docs/proofs.md: the crosses left at every level of a proof."""
+"""The picture of the home page: the crosses left at every level of a proof (`python docs/make.py proof`)."""
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-from crossfield.export.pictures.draw import fixed_settings
 from crossfield.export.pictures.marks import STROKE
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.domain import Bools, Floats
 from crossfield.models.instance.grid import Grid
+from crossfield.models.processes.limits import Limits
+from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.checkers import check_certificate
 from crossfield.models.proof.descent.record import Proof
+from crossfield.models.proof.prove import prove
+from crossfield.models.samples.samples import sample
 from diagrams import STYLE
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
+from plots import fixed_settings
 
 STRIP: Final = HALF**2
 """Area of all crosses, in radians squared."""
@@ -82,3 +87,11 @@ def _strokes(place: Any, proof: Proof) -> None:
     instance = proof.field.instance
     at = instance.stroke_index
     place.plot(instance.grid.columns[at], instance.grid.rows[at], "o", color=STROKE, markersize=1.0)
+
+
+def draw_levels() -> None:
+    """Prove the sample `mouse`, and draw its picture."""
+    proof = prove(sample("mouse", 24), limits=Limits(120.0, gap=0))
+    with tempfile.TemporaryDirectory() as folder:
+        certificate = write_certificate(proof, Path(folder) / "certificate.npz")
+    draw_maps(proof, certificate.proven.boxes, Path(__file__).parent / "pictures" / "proof_levels.png")

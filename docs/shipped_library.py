@@ -1,19 +1,7 @@
-"""Replace the counts of the library that ships in docs/library.md and docs/guides/libraries.md.
-
-    python docs/shipped_library.py [--measure]
-
-Counts are those of its table and points. With --measure, its build is timed first and
-docs/library.json replaced.
-"""
+"""Counts of the library that ships, in its page and its guide (`python docs/make.py library`)."""
 
 from __future__ import annotations
 
-import argparse
-import json
-import os
-import subprocess
-import sys
-import tempfile
 from collections import Counter, defaultdict
 from pathlib import Path
 from typing import Any, Final
@@ -23,11 +11,9 @@ from crossfield.export.library.ledger.grades import is_proven
 from crossfield.export.library.ledger.ledger import read_ledger
 from crossfield.export.library.plan.recipe import norm_minimised
 from crossfield.export.library.plan.spec import DEFAULT, RUNGS, default_spec
-from machine import processor_name
 from make import markdown, replace_between
 
 DOCS: Final = Path(__file__).resolve().parent
-MEASURED: Final = DOCS / "library.json"
 POINTS: Final = DEFAULT.parent / "known" / "points"
 CONTENTS: Final = {
     "tiny": "both gauges, both facets",
@@ -38,18 +24,6 @@ CONTENTS: Final = {
 }
 STATES: Final = ("optimal", "agreed", "claimed", "open")
 Facts = list[dict[str, Any]]
-
-
-def measure() -> None:
-    """Build the library and keep the processor seconds."""
-    with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "crossfield", "library", "build", "default", "-q", "-o"]
-        before = os.times()
-        subprocess.run([*command, f"{folder}/library"], check=True)
-        after = os.times()
-    spent = sum(after[2:4]) - sum(before[2:4])
-    facts = {"processor_seconds": round(spent), "processor": processor_name()}
-    MEASURED.write_text(json.dumps(facts, indent=1) + "\n")
 
 
 def rungs(entries: Facts) -> str:
@@ -70,12 +44,6 @@ def rungs(entries: Facts) -> str:
 def span(values: list[int]) -> str:
     """The least and the largest of some numbers."""
     return str(min(values)) if min(values) == max(values) else f"{min(values)} to {max(values)}"
-
-
-def minutes() -> str:
-    """The measured time of a build."""
-    facts = json.loads(MEASURED.read_text())
-    return f"about {facts['processor_seconds'] / 60:.1f} minutes of processor time ({facts['processor']})"
 
 
 def counts(entries: Facts) -> str:
@@ -103,7 +71,7 @@ def own_claims(entries: Facts) -> int:
         facts = known.get(record.entry)
         if facts is None or record.bound is None:
             continue
-        if is_proven(facts["objective"], min(record.bound, facts["objective"])):
+        if is_proven(facts["objective"], record.bound):
             programs[optimum_of(facts)].add(record.solver)
     claimed = [facts for facts in entries if facts["status"] == "claimed"]
     return sum(programs[optimum_of(facts)] == {"crossfield"} for facts in claimed)
@@ -128,12 +96,8 @@ def names() -> str:
     )
 
 
-def main() -> None:
-    """Replace the counts; measure first if asked."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--measure", action="store_true", help="build the library and measure the time")
-    if parser.parse_args().measure:
-        measure()
+def replace_counts() -> None:
+    """Replace the counts in both pages."""
     entries = [dict(entry.facts) for entry in cf.entries()]
     page = DOCS / "library.md"
     replace_between(page, "shipped", f"{rungs(entries)}\n\n{counts(entries)}")
@@ -143,9 +107,5 @@ def main() -> None:
         DOCS / "guides" / "libraries.md",
         "shipped",
         f"The specification `default` builds the library that ships: {len(entries)} entries of "
-        f"{len(instances)} instances, in {minutes()}.",
+        f"{len(instances)} instances.",
     )
-
-
-if __name__ == "__main__":
-    main()

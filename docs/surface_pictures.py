@@ -1,6 +1,6 @@
 """Pictures of surfaces, for docs/surface.md: strokes, normal map, shaded surface in a row.
 
-`python docs/surface_pictures.py` draws docs/pictures/surface_known.png and surface_samples.png anew.
+`python docs/make.py surfaces` draws docs/pictures/surface_known.png and surface_samples.png anew.
 
 A row is a surface; a known true surface is shaded next to it. All rows have the same lamp.
 """
@@ -21,11 +21,10 @@ from crossfield.export.surfaces.outline import find_outline
 from crossfield.models.instance.domain import Floats
 from crossfield.models.sketch.samples import SAMPLES
 from crossfield.models.surface.surface import Surface
-from diagrams import drawing_of
+from diagrams import bend_field_of, drawing_of
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
-from surface import SURFACES, angles, field_by, normal_error
 
 CELL: Final = 2.1
 """Inches of a picture's longer side."""
@@ -107,23 +106,30 @@ def _cells(row: Row, view: View) -> list[NDArray[np.uint8]]:
 def known_rows() -> list[Row]:
     """Surfaces with a known answer, from the bend fields of their strokes, on the side of the truth."""
     rows = []
-    for name in SURFACES:
+    for name in (name for name, entry in SAMPLES.items() if entry.kind == "analytic"):
         true = cf.analytic(name, SIZE)
-        estimate = cf.surface(field_by("bend", true.instance))
-        off = normal_error(estimate, true.normals)
-        if off.mean() < angles(estimate.normals, true.normals).mean():
-            estimate = estimate.flipped()
-        rows.append(Row(f"{name}, {off.mean():.1f}° off", estimate, true.normals))
+        first = cf.surface(bend_field_of(true.instance))
+        error, _, estimate = min(
+            (mean_angle(side.normals, true.normals), number, side)
+            for number, side in enumerate((first, first.flipped()))
+        )
+        rows.append(Row(f"{name}, {error:.1f}° off", estimate, true.normals))
     return rows
+
+
+def mean_angle(first: Floats, second: Floats) -> float:
+    """Mean angle in degrees between unit normals (n, 3)."""
+    return float(np.degrees(np.arccos(np.clip((first * second).sum(axis=1), -1, 1))).mean())
 
 
 def sample_rows() -> list[Row]:
     """The drawn samples with the surfaces over their bend fields."""
     drawn = [name for name, entry in SAMPLES.items() if entry.kind == "sketch"]
-    return [Row(name, cf.surface(field_by("bend", cf.sample(name, SIZE)))) for name in drawn]
+    return [Row(name, cf.surface(bend_field_of(cf.sample(name, SIZE)))) for name in drawn]
 
 
-if __name__ == "__main__":
+def draw_pictures() -> None:
+    """Draw both pictures."""
     folder = Path(__file__).resolve().parent / "pictures"
     draw_rows(known_rows(), folder / "surface_known.png")
     draw_rows(sample_rows(), folder / "surface_samples.png")

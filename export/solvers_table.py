@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from importlib.util import find_spec
 from typing import Final, Literal, NamedTuple
 
@@ -125,7 +125,8 @@ PROGRAMS: Final = {
         ),
         Program("cbc", "CBC", ("lp", "mps"), (), "cbc", "apt install coinor-cbc", 1e-6),
         Program(
-            "glpk", "GLPK", ("lp", "mps"), ("mod",), "glpsol", "apt install glpk-utils", 1e-14, adds=r"~r_\d+"
+            "glpk", "GLPK", ("lp", "mps", "mod"), (), "glpsol", "apt install glpk-utils", 1e-14,
+            adds=r"~r_\d+",
         ),
         Program("casadi", "CasADi", (), ("nl",), "casadi", "pip install casadi"),
         Program(
@@ -339,4 +340,7 @@ def smallest_problem(formulation: Formulation) -> Problem:
     pixels, ones = np.zeros((1, 2), dtype=np.int32), np.ones(1)
     mask, orthogonal = np.ones((2, 2), dtype=bool), formulation.declaration.orthogonal
     instance = Instance.on_pixels("smallest", mask, pixels, ones, ones, orthogonal=orthogonal)
-    return Problem(instance, formulation, np.zeros(4, dtype=np.int32) if formulation.fixed else None)
+    of_pixels = replace(formulation, options=replace(formulation.options, indices=()))
+    return Problem(
+        instance, of_pixels, np.zeros(4, dtype=np.int32) if formulation.declaration.fixed else None
+    )

@@ -62,6 +62,14 @@ def is_gap_closed(bound: float, objective: float) -> bool:
     return objective - bound <= max(absolute, relative * abs(objective))
 
 
+_INFINITE: Final = 1e19  # of numbers that programs mean as infinite, the least is 1e20
+
+
+def finite_or_none(value: float | None) -> float | None:
+    """The number, or None for a number that a program means as infinite."""
+    return None if value is None or abs(value) >= _INFINITE else float(value)
+
+
 class _Claim(NamedTuple):
     """A row of the table: pattern of whole words or codes, their status, and their meaning."""
 
@@ -164,13 +172,3 @@ CASADI: Final = {
 
 0: solved; 100: solved?; 200: infeasible; 300: unbounded; 400: limit with a point.
 """
-
-
-def status_of_baron(banner: str, *, has_table: bool, unbounded: bool) -> Status:
-    """The status of BARON's last banner, and of whether a table of the best point and a ray follow it."""
-    status, _ = claim_of(banner, "baron-res")
-    if not status.is_optimal:
-        return Status.LIMIT_WITH_POINT if has_table else status.without_point
-    if unbounded:
-        return Status.UNBOUNDED
-    return status if has_table else Status.INFEASIBLE

@@ -67,3 +67,13 @@ def whole_numbers(
     if not ((array >= -(2**31)) & (array < 2**31)).all() or (array != np.floor(array)).any():
         raise error(f"{name} holds something other than whole numbers of 32 bits")
     return array.astype(np.int32)
+
+
+def boolean_array(values: Any) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """The values as booleans. Raises InstanceError unless they are True and False, or 1 and 0."""
+    booleans = isinstance(values, np.ndarray) and values.dtype.kind == "b"
+    array = values if booleans else float_array(values, "mask", InstanceError)
+    mask = np.asarray(array != 0)
+    if (array != mask).any():
+        raise InstanceError("mask holds something other than True and False")
+    return mask

@@ -18,8 +18,6 @@ MAX_DEPTH: Final = 50  # elements inside of one another, counting copies; the re
 MAX_LAYERS: Final = 5000  # clips, masks and opacities, each as a share of the page
 MAX_DATA: Final = 10_000_000  # characters of path data, point lists, styles and transforms of elements
 MAX_CURVES: Final = 500_000  # segments of all shapes, counting every repetition by `use`
-MAX_OUTLINE_SAMPLES: Final = 2_000_000  # samples of the outlines of all shapes that are only filled
-MAX_SAMPLE_PAIRS: Final = 8_000_000  # pairs of near samples of an outline; with more it counts as an area
 MAX_LENGTH: Final = 64  # characters of a length or a colour
 MAX_TRANSFORM: Final = 1000  # characters of a transform
 LEAST_LENGTH: Final = 1e-9  # width and height of a page: the quotient of two smaller lengths is not finite
@@ -43,5 +41,3 @@ MAX_NUMBER: Final = 40  # characters of a number in a .rawfield, on average; a d
 
 # Solutions
 MAX_SOLUTION: Final = 1 << 31  # bytes of a solution file, packed and unpacked: 50 per column of 40 million
-
-# Logs of solvers

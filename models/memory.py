@@ -43,8 +43,8 @@ def available_memory() -> int | None:
     with suppress(OSError, ValueError, IndexError):
         text = Path("/proc/meminfo").read_text("ascii")
         free.append(1024 * int(re.findall(r"^MemAvailable:\s*(\d+) kB", text, re.MULTILINE)[0]))
-    if not free:
-        with suppress(AttributeError, OSError, ValueError):
+    if not free and sys.platform != "win32":
+        with suppress(OSError, ValueError):
             free.append(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     with suppress(OSError):
         free += free_in_groups(Path("/proc/self/cgroup").read_text("utf-8"), Path("/sys/fs/cgroup"))

@@ -13,7 +13,7 @@ import stat
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import count
@@ -130,9 +130,12 @@ def replace_results(
         folder that the message names.
 
     """
-    folder, order, reads = make_folder(folder), list(dict.fromkeys(planned)), tuple(reads)
+    existed, folder, order, reads = os.path.lexists(folder), make_folder(folder), [*planned], tuple(reads)
     check_targets(folder, order, reads=reads, force=force)
-    with _temporary_neighbour(folder / "results", Path.mkdir) as temporary:
+    with ExitStack() as stack:
+        if not existed:
+            stack.callback(_remove_if_empty, folder)
+        temporary = stack.enter_context(_temporary_neighbour(folder / "results", Path.mkdir))
         new = NewResults(temporary, folder)
         try:
             yield new
@@ -153,6 +156,11 @@ def replace_results(
             _install(steps, folder)
         except OutputError as error:
             raise OutputError(f"{error}; the new files are in {new.set_aside()}") from error
+
+
+def _remove_if_empty(folder: Path) -> None:
+    with suppress(OSError):
+        folder.rmdir()
 
 
 def _install(steps: dict[str, Path | None], folder: Path) -> None:
@@ -228,16 +236,17 @@ def _lock(temporary: Path) -> int:
     """
     if sys.platform == "win32":
         return -1
-    descriptor = os.open(temporary, os.O_RDONLY | os.O_NOFOLLOW)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        temporary.lstat()
-    except OSError as error:
-        os.close(descriptor)
-        if isinstance(error, BlockingIOError | FileNotFoundError):
-            raise
-        return -1
-    return descriptor
+    else:  # noqa: RET505 - see models/processes/process_groups.py
+        descriptor = os.open(temporary, os.O_RDONLY | os.O_NOFOLLOW)
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            temporary.lstat()
+        except OSError as error:
+            os.close(descriptor)
+            if isinstance(error, BlockingIOError | FileNotFoundError):
+                raise
+            return -1
+        return descriptor
 
 
 def remove_unfinished() -> None:
@@ -270,16 +279,15 @@ def remove_dead(folder: Path) -> None:
     Their locks ended with their processes, which may have run in other containers. No write needs the
     removal, because names are never used twice. Raises OSError when the folder cannot be listed.
     """
-    if sys.platform == "win32":
-        return
-    for path in folder.iterdir():
-        with suppress(OSError):
-            if not MARK.fullmatch(path.name) or path.lstat().st_uid != os.geteuid():
-                continue
-            lock = _lock(path)
-            if lock >= 0:
-                _remove(path)
-                os.close(lock)
+    if sys.platform != "win32":
+        for path in folder.iterdir():
+            with suppress(OSError):
+                if not MARK.fullmatch(path.name) or path.lstat().st_uid != os.geteuid():
+                    continue
+                lock = _lock(path)
+                if lock >= 0:
+                    _remove(path)
+                    os.close(lock)
 
 
 def write_bytes(path: str | Path, data: bytes, *, force: bool = False) -> Path:

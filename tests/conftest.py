@@ -94,6 +94,12 @@ def pytest_collection_modifyitems(config, items):
     return result
 
 
+def pytest_runtest_setup():
+    """HiGHS refuses another number of threads than that of the first solve in the process."""
+    if highspy := sys.modules.get("highspy"):
+        highspy.Highs.resetGlobalScheduler(True)
+
+
 def _absent(item):
     marks = list(item.iter_markers("needs"))
     if not marks:

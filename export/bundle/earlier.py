@@ -13,7 +13,8 @@ from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress
 from ...models.storage import NewResults
 from ...models.written_files import is_unchanged, kept_notice
-from ..solutions.solution import Solution, read_solution
+from ..solutions.read import read_solution
+from ..solutions.solution import Solution
 from .manifest import file_stem, manifest_path, read_manifest
 
 
@@ -63,20 +64,18 @@ def keep_better_field(
     *,
     on: Instance,
     value: Callable[[CrossField], float] = lambda field: field.energy().total,
-) -> CrossField | None:
-    """Keep an earlier field on an instance if it is better than the one found now, or none is; return it.
+) -> None:
+    """Keep an earlier field on an instance if it is better than the one found now, or none is.
 
     value: what a better field has less of; by default its 2-norm energy.
     """
     earlier = earlier_field(new.folder / name, on)
     if earlier is None:
-        return None
+        return
     was, found = value(earlier), None if now is None else value(now)
-    if found is not None and was >= found - SAME * (1 + abs(found)):
-        return None
-    notice(kept_notice(name, f"energy {was:.6g}", "no field" if found is None else f"energy {found:.6g}"))
-    new.kept.add(name)
-    return earlier
+    if found is None or was < found - SAME * (1 + abs(found)):
+        notice(kept_notice(name, f"energy {was:.6g}", "no field" if found is None else f"energy {found:.6g}"))
+        new.kept.add(name)
 
 
 def objective_function(problem: Problem) -> Callable[[CrossField], float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
 
@@ -12,7 +12,7 @@ import numpy as np
 
 from ...models.documents import read_document
 from ...models.errors import CrossfieldError, InstanceError, naming
-from ...models.formulations.problem import Problem, formulate, with_windows
+from ...models.formulations.problem import Problem, formulate
 from ...models.formulations.windows import Windows
 from ...models.instance.domain import Ints
 from ...models.instance.file import read_instance, write_instance
@@ -36,6 +36,10 @@ class Manifest:
 
     document: dict[str, Any]
     path: Path
+
+    def __repr__(self) -> str:
+        formats = ", ".join(dict.fromkeys(file["format"] for file in self.document["files"]))
+        return f"<Manifest {self.path}: {self.formulation} in {formats}>"
 
     @property
     def formulation(self) -> str:
@@ -85,7 +89,7 @@ def described_problem(
     with naming(path):
         jumps = _jumps_of_list(document["jumps"], instance)
         problem = formulate(instance, document["formulation"], p=jumps, **document["options"])
-        problem = with_windows(problem, windows_of(instance))
+        problem = replace(problem, windows=windows_of(instance))
         if problem.sha256 not in (document.get("sha256"), document.get("problem_sha256")):
             raise InstanceError("does not fit its own instance, options and jumps; write it again")
     return problem
@@ -173,7 +177,7 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
     if problem.windows is not None:  # and the sentence about it in the files' headers
         tightening |= {"tightened": problem.tightened, "windows": problem.windows.document()}
     files = [
-        {"name": name, "format": entry.format, "dialect": entry.dialect, "lifted": entry.lifted, **facts}
+        {"name": name, "format": entry.format, "lifted": entry.lifted, **facts}
         for entry in written
         for name, facts in entry.files.items()
     ]
@@ -188,7 +192,7 @@ def manifest_document(problem: Problem, written: list[Written], refused: dict[st
             "sha256": instance.sha256,
         },
         "formulation": formulation.name,
-        "paper": formulation.paper,
+        "paper": formulation.declaration.paper,
         "options": formulation.options.document,
         "class": problem.problem_class,
         "convex": problem.is_convex,

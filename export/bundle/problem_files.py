@@ -11,75 +11,101 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Iterable
+from dataclasses import replace
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import Any, overload
 
 from ...models.arguments import check_choice, check_flag
 from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
-from ...models.formulations.catalogue import declaration_of, declare, list_formulations
-from ...models.formulations.declaration import Declaration, Formulation, Options
-from ...models.formulations.problem import Problem, formulate, with_windows
+from ...models.formulations.catalogue import FORMULATIONS, declaration_of
+from ...models.formulations.choice import list_formulations
+from ...models.formulations.declaration import Declaration, Options
+from ...models.formulations.problem import Problem, formulate
 from ...models.formulations.windows import Windows
 from ...models.instance.domain import Ints
 from ...models.instance.instance import Instance
 from ...models.processes.deadline import Progress, silent
 from ...models.storage import replace_results
-from ..formats.registry import DEFAULTS, FORMATS, file_names, problem_in_format, write
-from ..solvers_table import smallest_problem
+from ..formats.registry import DEFAULTS, FORMATS, Written, file_names
+from ..formats.registry import write as write_file
 from .manifest import LARGE, Manifest, file_stem, instance_file, write_manifest
 from .starts import STARTS, start_name, write_starts
 
 
-def write_problem(
+@overload
+def write(
+    problem: Problem, path: str | Path, *, start: CrossField | None = None, force: bool = False
+) -> Written: ...
+@overload
+def write(
     problem: Problem,
-    folder: str | Path,
+    path: str | Path,
     *,
-    formats: Iterable[str] = DEFAULTS,
+    formats: Iterable[str],
     start: CrossField | None = None,
-    dialects: dict[str, str] | None = None,
     compress: bool = False,
     force: bool = False,
-) -> Manifest:
-    """Write one problem in several formats, with its instance and manifest.
+) -> Manifest: ...
+def write(
+    problem: Problem,
+    path: str | Path,
+    *,
+    formats: Iterable[str] | None = None,
+    start: CrossField | None = None,
+    compress: bool = False,
+    force: bool = False,
+) -> Written | Manifest:
+    """Write a problem to a file, or in several formats to a folder. Equal problems give equal bytes.
+
+    A .nl comes with a .row and a .col file, and a .mod with its .dat; the files appear together.
 
     Parameters
     ----------
     problem
         The problem.
-    folder
-        Folder to write to; created if it does not exist.
+    path
+        File to write. Its suffix names the format, and a further `.gz` compresses it. With formats, a folder.
     formats
-        Names of formats. Those that cannot carry the problem are listed in the manifest as refused.
-    start, dialects, compress, force
-        As for `write_all`.
+        Names of formats. The folder then also holds the instance, start files for each solver, and a
+        manifest, which lists the formats that cannot carry the problem as refused.
+    start
+        A field whose point becomes the starting point. A single file must be of a format that has a place for
+        one: nl, gms, qplib and bar.
+    compress
+        Whether to write model files as .gz; only with formats.
+    force
+        Whether to replace files that crossfield has not written or that have changed since.
 
     Returns
     -------
-    Manifest
-        The manifest.
+    Written or Manifest
+        Of a file its format, the problem as it holds it, and size and SHA-256 by name; of a folder its
+        manifest.
 
     Raises
     ------
     UnsupportedByFormatError
-        If no file can be written because the formats hold none of the problems.
+        If the format cannot carry the problem, or has no place for the start.
     InputError
-        For an unknown format, and for a problem that no manifest records: with columns fixed one by one, or
-        with products lifted beforehand.
+        For an unknown suffix or format, for more pixels or faces than the memory holds, and, with formats,
+        for a problem with columns fixed or products lifted, which no manifest records.
     OutputError
-        If a file cannot be written, or if others are in the way.
+        If a file cannot be written, or if another one is in the way.
 
     """
+    if formats is None:
+        return write_file(problem, path, start=start, force=force)
     if not problem.is_recordable:
         changed = f"{problem.name} with columns fixed or products lifted"
         raise InputError(f"a manifest cannot record {changed}; write it as a single file")
     formats = tuple(formats)
-    _check_formats(formats, dialects or {}, [problem.formulation])
     names = names_of_set(problem.instance, problem.name, formats, compress=compress)
-    with replace_results(folder, names, force=force) as new:
-        manifest = _write_problem_files(problem, new.path, formats, start, dialects or {}, compress=compress)
-    return manifest.moved_to(folder)
+    with replace_results(path, names, force=force) as new:
+        manifest = _write_problem_files(problem, new.path, formats, start, compress=compress)
+        _check_written([manifest])
+    return manifest.moved_to(path)
 
 
 def write_all(
@@ -92,7 +118,6 @@ def write_all(
     jumps_of: CrossField | None = None,
     windows: Windows | None = None,
     options: dict[str, Any] | None = None,
-    dialects: dict[str, str] | None = None,
     compress: bool = False,
     force: bool = False,
     progress: Progress = silent,
@@ -116,9 +141,8 @@ def write_all(
     windows
         Narrower windows of alpha and beta and ranges of jumps, for all formulations.
     options
-        `facet`, `stroke_norm`, `beta_norm`, `relax` and `limits`, each used where a formulation has it.
-    dialects
-        By format: `text` or `binary` for nl.
+        `facet`, `stroke_norm`, `beta_norm`, `relax` and `limits`, each used where a formulation has it, and
+        `indices`, which other formulations refuse.
     compress
         Whether to write model files as .gz.
     force
@@ -148,18 +172,15 @@ def write_all(
     options = options or {}
     if formulations is None:
         formulations = list_formulations(instance, narrowed=windows is not None)
+        if options.get("indices"):
+            formulations = [name for name, one in FORMULATIONS.items() if "indices" in one.option_names]
     declarations = [declaration_of(name) for name in formulations]
 
     def chosen(declaration: Declaration) -> dict[str, Any]:
-        unfit = {*Options.__dataclass_fields__} - declaration.option_names
+        unfit = {*Options.__dataclass_fields__} - declaration.option_names - {"indices"}
         return {key: value for key, value in options.items() if key not in unfit}
 
     formats = tuple(formats)
-    _check_formats(
-        formats,
-        dialects or {},
-        [declare(declaration.name, instance, **chosen(declaration)) for declaration in declarations],
-    )
     sets = (
         names_of_set(instance, declaration.name, formats, compress=compress) for declaration in declarations
     )
@@ -169,42 +190,32 @@ def write_all(
             progress(declaration.name)
             jumps = jumps_as_data(instance, declaration.name, jumps_of or start)
             problem = formulate(instance, declaration.name, p=jumps, **chosen(declaration))
-            problem = with_windows(problem, windows)
-            manifests.append(
-                _write_problem_files(problem, new.path, formats, start, dialects or {}, compress=compress)
-            )
+            problem = replace(problem, windows=windows)
+            manifests.append(_write_problem_files(problem, new.path, formats, start, compress=compress))
             del problem
             if instance.domain.size > LARGE:
                 gc.collect()  # a problem is in a cycle, and the collector counts objects, not their bytes
+        _check_written(manifests)
     return [manifest.moved_to(folder) for manifest in manifests]
 
 
 def names_of_set(instance: Instance, name: str, formats: Iterable[str], *, compress: bool) -> list[str]:
     """Names of the files that a formulation of an instance can have in some formats, the manifest last."""
     check_flag("compress", compress)
+    formats = list(formats)
+    for form in formats:
+        check_choice("format", form, FORMATS)
     stem, packed = f"{instance.name}.{name}", ".gz" * compress
     models = [file_names(f"{stem}{FORMATS[form].suffix}{packed}", form) for form in formats]
     starts = [start_name(stem, solver) for solver in STARTS]
     return [*chain.from_iterable(models), *starts, instance_file(instance), f"{stem}.manifest.json"]
 
 
-def _check_formats(
-    formats: tuple[str, ...], dialects: dict[str, str], formulations: list[Formulation]
-) -> None:
-    """Check the names of formats, and that one of them holds one of the formulations."""
-    for name in (*formats, *dialects):
-        check_choice("format", name, FORMATS)
-    reasons = []
-    for problem in map(smallest_problem, formulations):
-        for name in formats:
-            try:
-                problem_in_format(problem, FORMATS[name])
-            except UnsupportedByFormatError as error:
-                reasons.append(str(error))
-            else:
-                return
-    if reasons:
-        raise UnsupportedByFormatError(f"nothing can be written: {', and '.join(reasons)}")
+def _check_written(manifests: list[Manifest]) -> None:
+    """Raise UnsupportedByFormatError if every format has refused every problem."""
+    reasons = [reason for manifest in manifests for reason in manifest.document["refused"].values()]
+    if reasons and not any(manifest.document["files"] for manifest in manifests):
+        raise UnsupportedByFormatError(f"nothing can be written: {', and '.join(dict.fromkeys(reasons))}")
 
 
 def _write_problem_files(
@@ -212,7 +223,6 @@ def _write_problem_files(
     folder: Path,
     formats: tuple[str, ...],
     start: CrossField | None,
-    dialects: dict[str, str],
     *,
     compress: bool,
 ) -> Manifest:
@@ -222,7 +232,7 @@ def _write_problem_files(
         entry = FORMATS[name]
         path = folder / f"{stem}{entry.suffix}{'.gz' if compress else ''}"
         try:
-            file = write(problem, path, dialect=dialects.get(name), start=start if entry.has_start else None)
+            file = write_file(problem, path, start=start if entry.has_start else None)
         except UnsupportedByFormatError as error:
             refused[name] = str(error)
         else:

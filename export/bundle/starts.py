@@ -23,8 +23,7 @@ from typing import Final
 
 import numpy as np
 
-from ...models.arguments import check_choice
-from ...models.errors import UnsupportedByFormatError, UnsupportedBySolverError
+from ...models.errors import UnsupportedByFormatError
 from ...models.field.field import CrossField
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Floats
@@ -95,7 +94,7 @@ def _cplex_file(start: Start) -> Iterator[bytes]:
 
 def _highs_file(start: Start) -> Iterator[bytes]:
     yield b"Model status\nUnknown\n\n# Primal solution values\nFeasible\n"
-    yield f"Objective {number_text(start.objective)}\n# Columns {start.form.column_count}\n".encode()
+    yield f"Objective {number_text(start.objective)}\n# Columns {start.problem.n_columns + 1}\n".encode()
     yield from start.lines()
     yield b"# Rows %d\n" % start.form.row_count("mps")
     yield from start.activities()
@@ -155,42 +154,29 @@ def complete_start(problem: Problem, field: CrossField) -> Start:
     return Start(held, held.point(field))
 
 
-def write_start(problem: Problem, field: CrossField, path: str | Path, solver: str) -> float:
-    """Write the start in a solver's format, and return its objective.
+def write_start(problem: Problem, field: CrossField, path: str | Path, solver: str) -> float | None:
+    """Write the start in the format of a solver, and return its objective.
 
-    Raises InputError for a solver without a format of starts, and UnsupportedBySolverError for a solver that
-    does not take the problem. Raises InstanceError when the field is on another instance, and OutputError.
+    None, and no file, for a solver that takes no start of the problem. Raises InstanceError when the field is
+    on another instance, and OutputError.
     """
-    check_choice("start format of", solver, STARTS)
     start = complete_start(problem, field)
-    refusal = _reason_of_refusal(problem, start, solver)
-    if refusal:
-        raise UnsupportedBySolverError(refusal)
-    save_file(Path(path), LAYOUTS[STARTS[solver].layout](start))
+    file = STARTS[solver]
+    if suitability(problem, solver).answer == "no" or (file.needs_convex and not start.problem.is_convex):
+        return None
+    save_file(Path(path), LAYOUTS[file.layout](start))
     return start.objective
 
 
-def write_starts(problem: Problem, field: CrossField, folder: str | Path, stem: str) -> dict[str, Path]:
+def write_starts(problem: Problem, field: CrossField, folder: Path, stem: str) -> dict[str, Path]:
     """Write the starts to the folder, as `stem.gurobi.start.mst`, for each solver that takes the problem.
 
     Returns the files by solver, none for a problem without integers, where they have no use. Raises as
     `write_start`.
     """
-    if not problem.integer.any():
-        return {}
-    start = complete_start(problem, field)
-    solvers = [name for name in STARTS if not _reason_of_refusal(problem, start, name)]
-    paths = {name: Path(folder) / start_name(stem, name) for name in solvers}
-    for name, path in paths.items():
-        save_file(path, LAYOUTS[STARTS[name].layout](start))
-    return paths
-
-
-def _reason_of_refusal(problem: Problem, start: Start, solver: str) -> str:
-    """Reason why a solver does not start from a point of the problem, empty if it does."""
-    taking = suitability(problem, solver)
-    if taking.answer == "no":
-        return f"{solver} does not take {problem.name}: {taking.reason}"
-    if STARTS[solver].needs_convex and not start.problem.is_convex:
-        return f"{solver} uses a start of convex problems only, and {problem.name} is not convex there"
-    return ""
+    paths = {solver: folder / start_name(stem, solver) for solver in STARTS if problem.integer.any()}
+    return {
+        solver: path
+        for solver, path in paths.items()
+        if write_start(problem, field, path, solver) is not None
+    }

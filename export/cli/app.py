@@ -8,11 +8,9 @@ result to keep, the exit code is 1. Heavy libraries are imported inside the comm
 from __future__ import annotations
 
 import logging
-import os
 import signal
 import sys
 from dataclasses import replace
-from functools import partial
 from typing import Annotated, Final, NoReturn
 
 import typer
@@ -29,17 +27,16 @@ from .inputs import (
     full_formulation_names,
     read_described_problem,
     read_field_or_instance,
+    read_source,
     read_start,
 )
 from .library_command import library
-from .mesh_options import MeshOptions
-from .option_groups import command as command_of
+from .options import add_command
 from .output import (
-    INTERRUPTED,
     escape_unencodable,
-    print_json,
     print_line,
     print_notice,
+    print_result,
     show_lists,
     show_manifests,
     show_progress,
@@ -47,7 +44,6 @@ from .output import (
 )
 from .prove_command import prove_command
 from .shade_command import shade_command
-from .sketch_options import Size, SketchOptions
 from .solve_command import print_solution, solve_command
 from .studio_command import studio_command
 from .verify_command import verify_command
@@ -63,12 +59,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-_WITHOUT_SOLVERS: Final = {"instance", "export", "read", "draw", "shade"}
-"""Commands that multiply no large matrices: to start threads for that takes up to a tenth of their time."""
-_STOPPED: Final = 130  # exit code of typer after a Ctrl-C that no command handled
-
-
-command = partial(command_of, app)
+_STOPPED: Final = 130  # exit code of typer after a Ctrl-C that no command handled itself
 
 
 @app.callback(invoke_without_command=True)
@@ -87,55 +78,71 @@ def root(
         raise typer.Exit
 
 
-@command("run", "crossfield run mouse -o out --time-limit 5")
+@add_command(app, "run", "crossfield run mouse -o out --time-limit 5")
 def run_command(
     source: options.Input,
     output: options.Folder,
     *,
-    sketch: SketchOptions,
+    size: options.Size = None,
+    mask: options.Mask = None,
+    silhouette: options.Silhouette = "none",
+    curvature: options.Curvature = None,
+    view: options.View = None,
+    stroke_weight: options.StrokeWeight = None,
     time_limit: options.SecondsPerMethod = 60.0,
     threads: options.Threads = 0,
     force: options.Force = False,
-    printing: options.PrintOptions,
+    as_json: options.Json = False,
 ) -> None:
     """Do all steps for one sketch or mesh: write the solver files, try the methods, keep a field and draw it.
 
-    The methods are {methods}. The field of bend is kept; the field of minimum 2-norm energy is written too.
+    The field of bend is kept; the field of minimum 2-norm energy is written too.
     report.json contains all facts. Ctrl-C ends the run with the fields so far; a second Ctrl-C ends it now.
     """
     from ...models.processes.limits import Limits
     from ..runs.run import plan_sentence, run
 
     limits = Limits(time_limit, threads=threads)
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         show("reading the sketch")
-        instance = sketch.read(source, "run", quiet=printing.quiet)
-    if not (printing.quiet or printing.as_json):
+        sketch = {"size": size, "mask": mask, "silhouette": silhouette, "curvature": curvature, "view": view}
+        instance = read_source(source, stroke_weight=stroke_weight, sketch=sketch)
+    if not as_json:
         print_line(plan_sentence(limits, instance))
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         report = run(
             instance,
             output,
             limits=limits,
             drawing=find_drawing(source),
-            mask=sketch.mask,
+            mask=mask,
             force=force,
             progress=show,
         )
-    printing.show(report.document(), lambda: show_report(report, report.folder))
+    print_result(report.document(), lambda: show_report(report, report.folder), as_json=as_json)
     if report.interrupted:
         print_notice(f"interrupted: {report.interrupted}; report.json lists the results so far")
     if report.folder != output:
         print_notice(f"the earlier run stays in {output}; the new results are in {report.folder}")
 
 
-@command("instance", "crossfield instance mouse --size 48 -o mouse.json")
+@add_command(app, "instance", "crossfield instance mouse --size 48 -o mouse.json")
 def instance_command(
     source: options.Input,
     output: options.Output,
     *,
-    sketch: SketchOptions,
-    mesh: MeshOptions,
+    size: options.Size = None,
+    mask: options.Mask = None,
+    silhouette: options.Silhouette = "none",
+    curvature: options.Curvature = None,
+    view: options.View = None,
+    stroke_weight: options.StrokeWeight = None,
+    sharp: options.Sharp = None,
+    boundary: options.Boundary = None,
+    directions: options.Directions = None,
+    weights: options.Weights = "unit",
+    sharp_weight: options.SharpWeight = None,
+    merge: options.Merge = None,
     crosses: options.Crosses = None,
     gauge: options.Gauge = None,
     skew_weight: options.SkewWeight = None,
@@ -146,56 +153,74 @@ def instance_command(
     Other commands take this file in place of a sketch or a mesh.
 
     With the suffix .png, write the mask of the instance: white where the field is wanted. Edit it in a paint
-    program and pass it to --mask.
+    program and pass it to --mask. With .sharp, write the edges of a mesh that have strokes, for QuadWild.
     """
     from ...models.instance.file import write_instance
+    from ...models.mesh.sharp_edges import write_sharp_edges
     from ..pictures.mask import write_mask
 
-    require_suffix(output, ".json", ".npz", ".png")
-    check_output(output, source, sketch.mask, mesh.directions, force=force)
+    writers = {
+        ".json": write_instance,
+        ".npz": write_instance,
+        ".png": write_mask,
+        ".sharp": write_sharp_edges,
+    }
+    require_suffix(output, *writers)
+    check_output(output, source, mask, directions, force=force)
     with show_progress() as show:
         show("reading the sketch")
-        instance = sketch.read(source, "instance", mesh=mesh).with_weights(skew_weight=skew_weight)
+        sketch = {"size": size, "mask": mask, "silhouette": silhouette, "curvature": curvature, "view": view}
+        of_mesh = {
+            "sharp": sharp,
+            "boundary": boundary,
+            "directions": directions,
+            "weights": weights,
+            "sharp_weight": sharp_weight,
+            "merge": merge,
+        }
+        instance = read_source(source, stroke_weight=stroke_weight, sketch=sketch, mesh=of_mesh)
+        instance = instance.with_weights(skew_weight=skew_weight)
         instance = instance if gauge is None else instance.with_gauge(gauge)
         if crosses is not None:
             instance = replace(instance, orthogonal=crosses == "orthogonal")
-        (write_mask if output.suffix.lower() == ".png" else write_instance)(instance, output, force=force)
+        writers[output.suffix.lower()](instance, output, force=force)
     print_line(f"{output}: {instance.summary}")
 
 
-@command("export", "crossfield export skew --size 4 -f milp-mccormick -F mps -F lp -o files")
+@add_command(app, "export", "crossfield export skew --size 4 -f milp-mccormick -F mps -F lp -o files")
 def export_command(
     source: options.Input,
     output: options.Folder,
     *,
     formulation: options.FormulationNames = None,
     file_format: options.FormatNames = None,
-    size: Size = None,
+    size: options.Size = None,
     facet: options.Facet = None,
     stroke_norm: options.StrokeNorm = None,
     beta_norm: options.BetaNorm = None,
     relax: options.Relax = False,
     limits: options.ResidualLimits = False,
+    indices: options.Indices = None,
     start: options.Start = None,
     tightened: options.Tightened = None,
-    nl_form: options.NlForm = None,
     compress: options.Gzip = False,
     force: options.Force = False,
-    printing: options.PrintOptions,
+    as_json: options.Json = False,
 ) -> None:
     """Write an instance as files for solvers, in every formulation and format.
 
     By default, formulations that the instance cannot have are left out. Each formulation also has a manifest
     (.manifest.json), which `crossfield read` needs.
     """
+    from ...models.field.exchange import read_sings
     from ..bundle.problem_files import write_all
     from ..formats.registry import DEFAULTS, FORMATS
 
     formulations = full_formulation_names(formulation) if formulation else None
     formats = check_names(file_format or list(DEFAULTS), FORMATS, "format")
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         show("reading the sketch")
-        instance = SketchOptions(size).read(source, "export", quiet=printing.quiet)
+        instance = read_source(source, sketch={"size": size})
         field, jumps_of, windows = read_start(start, instance), None, None
         if tightened is not None:
             from ...models.proof.certificate import read_certificate
@@ -218,21 +243,27 @@ def export_command(
                 "beta_norm": beta_norm,
                 "relax": relax or None,
                 "limits": limits or None,
+                "indices": None if indices is None else read_sings(indices),
             },
-            dialects={"nl": nl_form} if nl_form else {},
             compress=compress,
             force=force,
             progress=show,
         )
     documents = [manifest.document for manifest in manifests]
-    printing.show(documents, lambda: show_manifests(instance, documents, output, complete=not formulation))
+    print_result(
+        documents,
+        lambda: show_manifests(instance, documents, output, complete=not formulation),
+        as_json=as_json,
+    )
 
 
-command("solve", "crossfield solve mouse --size 48 --method bend -o field")(solve_command)
-command("prove", "crossfield prove skew --size 5 -o proof")(prove_command)
+add_command(app, "solve", "crossfield solve mouse --size 48 --method bend -o field")(solve_command)
+add_command(app, "prove", "crossfield prove skew --size 5 -o proof")(prove_command)
 
 
-@command("read", "crossfield read skew.sol --manifest files/skew.milp-mccormick.manifest.json -o skew.npz")
+@add_command(
+    app, "read", "crossfield read skew.sol --manifest files/skew.milp-mccormick.manifest.json -o skew.npz"
+)
 def read_command(
     solution: options.SolutionFile,
     manifest: options.Manifest,
@@ -243,7 +274,7 @@ def read_command(
     gap: options.AnswerGap = None,
     bound: options.AnswerBound = None,
     force: options.Force = False,
-    printing: options.PrintOptions,
+    as_json: options.Json = False,
 ) -> None:
     """Read a solver's solution file back as a cross field, and check it.
 
@@ -253,12 +284,12 @@ def read_command(
     from ...models.errors import SolutionError
     from ...models.field.file import field_names, write_field
     from ..bundle.earlier import keep_better_field, objective_function
-    from ..solutions.solution import read_solution
+    from ..solutions.read import read_solution
 
     require_suffix(output, *SAVED)
     names, reads = field_names(output.name), [solution, manifest]
     check_targets(output.parent, names, reads=reads, force=force)
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         show("reading the solution")
         problem, held = read_described_problem(manifest)
         answer = read_solution(
@@ -288,13 +319,13 @@ def read_command(
                         on=problem.instance,
                         value=objective_function(problem),
                     )
-    print_solution(answer, output, printing)
+    print_solution(answer, output, as_json=as_json)
     if answer.doubt:
         remedy = answer.remedy and f"; {answer.remedy}"
         raise SolutionError(f"{answer.doubt}; no field was written{remedy}", file=solution)
 
 
-@command("draw", "crossfield draw field/mouse.bend.field.npz --kind overview -o field.png")
+@add_command(app, "draw", "crossfield draw field/mouse.bend.field.npz --kind overview -o field.png")
 def draw_command(
     source: options.FieldOrInstance,
     output: options.Output,
@@ -302,9 +333,10 @@ def draw_command(
     on: options.On = None,
     kind: options.Kind = None,
     underlay: options.Underlay = None,
+    up: options.Up = None,
     force: options.Force = False,
 ) -> None:
-    """Draw a field or an instance as PNG, SVG or PDF.
+    """Draw a field or an instance as PNG or SVG.
 
     A field as SVG has one layer for each of its parts, in the coordinates of the drawing.
     """
@@ -314,27 +346,26 @@ def draw_command(
     check_output(output, source, on, underlay, force=force)
     with show_progress() as show:
         show("reading")
-        subject = read_field_or_instance(source, on, "draw")
+        subject = read_field_or_instance(source, on)
         show("drawing")
-        draw(subject, output, kind=kind, underlay=underlay, force=force)
+        draw(subject, output, kind=kind, underlay=underlay, up=up, force=force)
     print_line(str(output))
 
 
-command("shade", "crossfield shade field/mouse.bend.field.npz --underlay mouse -o surface")(shade_command)
-command("studio", "crossfield studio mouse")(studio_command)
-command("verify", "crossfield verify files --solve 2")(verify_command)
+add_command(app, "shade", "crossfield shade field/mouse.bend.field.npz --underlay mouse -o surface")(
+    shade_command
+)
+add_command(app, "studio", "crossfield studio mouse")(studio_command)
+add_command(app, "verify", "crossfield verify files --solve 2")(verify_command)
 
 
-@command("list", "crossfield list")
+@add_command(app, "list", "crossfield list")
 def list_command(*, as_json: options.Json = False) -> None:
     """List samples, formulations, formats, solvers and methods, and their combinations."""
     from .tables import tables
 
     content = tables()
-    if as_json:
-        print_json(content)
-    else:
-        show_lists(content)
+    print_result(content, lambda: show_lists(content), as_json=as_json)
 
 
 app.add_typer(library, name="library")
@@ -343,11 +374,8 @@ app.add_typer(library, name="library")
 def main() -> NoReturn:
     """Run the command line and exit with its exit code; SIGTERM too removes files that are not complete."""
     escape_unencodable()
-    for reader in ("PIL", "trimesh"):  # every error is one line, printed by `invoke`
-        logging.getLogger(reader).addHandler(logging.NullHandler())
+    logging.getLogger("PIL").addHandler(logging.NullHandler())  # `invoke` prints every error as one line
     signal.signal(signal.SIGTERM, lambda number, _: sys.exit(128 + number))
-    if _WITHOUT_SOLVERS.intersection(sys.argv[1:2]):
-        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         sys.exit(invoke(sys.argv[1:]))
     finally:
@@ -364,7 +392,7 @@ def invoke(arguments: list[str]) -> int:
     except SystemExit as stop:
         if stop.code != _STOPPED:
             return int(stop.code or 0)
-        print_notice(INTERRUPTED)
+        print_notice("interrupted; all written files are complete")
     except Exception as error:
         if "--debug" in arguments:
             raise

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 from ...models.errors import CrossfieldError, InputError
 from ...models.storage import require_suffix
 from ...models.written_files import check_targets
-from .mesh_options import check_domain
+from .output import print_notice
 
 if TYPE_CHECKING:
     from ...models.field.field import CrossField
@@ -18,6 +18,68 @@ if TYPE_CHECKING:
 
 SAVED: Final = (".npz", ".json", ".rawfield")
 """Suffixes of the files that hold a field."""
+
+
+def read_source(
+    source: str,
+    *,
+    stroke_weight: float | None = None,
+    sketch: Mapping[str, Any] | None = None,
+    mesh: Mapping[str, Any] | None = None,
+) -> Instance:
+    """Instance of a sketch or mesh file, a sample or an instance file; prints the warnings of its reader.
+
+    sketch, mesh: options of `read_sketch` and `read_mesh`. Raises InputError for an option that the source
+    does not take, and InstanceError for a weight that is out of range.
+    """
+    from ...models.mesh.formats import mesh_suffix
+
+    path = Path(source)
+    of_sketch = {name: value for name, value in (sketch or {}).items() if value not in (None, "none")}
+    of_mesh = {name: value for name, value in (mesh or {}).items() if value not in (None, "unit")}
+    if mesh_suffix(path):
+        from ...models.mesh.read import read_mesh
+
+        _refuse(of_sketch, "a mesh", path)
+        instance = read_mesh(path, **of_mesh)
+    else:
+        _refuse(of_mesh, "no mesh file", path)
+        instance = _read_drawing_or_instance(path, of_sketch)
+    for text in instance.reading.warnings if instance.reading else ():
+        print_notice(f"warning: {instance.source}: {text}")
+    return instance.with_weights(stroke_weight=stroke_weight)
+
+
+def _read_drawing_or_instance(path: Path, options: dict[str, Any]) -> Instance:
+    """Instance of a sketch file, a sample or an instance file."""
+    if path.is_file() and path.suffix.lower() in {".json", ".npz"}:
+        from ...models.instance.file import read_instance
+
+        _refuse(options, "no drawing", path)
+        return read_instance(path)
+    if not path.is_file():
+        from ...models.mesh.shapes import MESHES
+        from ...models.samples.samples import sample
+        from ...models.sketch.samples import SAMPLES
+
+        if str(path) in {*SAMPLES, *MESHES}:
+            taken = {"size", "silhouette"} if str(path) in SAMPLES else set()
+            refused = {name: value for name, value in options.items() if name not in taken}
+            _refuse(refused, "a sample", path)
+            return sample(str(path), **options)
+    if not path.exists():
+        raise InputError(
+            "there is no such file and no such sample; `crossfield list` lists the samples", file=path
+        )
+    from ...models.sketch.read import read_sketch
+
+    return read_sketch(path, **options)
+
+
+def _refuse(options: Mapping[str, Any], what: str, path: Path) -> None:
+    """Raise InputError for options that a source does not take."""
+    if options:
+        raise InputError(f"is {what}; leave --{' and --'.join(options).replace('_', '-')} out", file=path)
 
 
 def read_start(path: Path | None, instance: Instance) -> CrossField | None:
@@ -44,20 +106,11 @@ def read_described_problem(path: Path) -> tuple[Problem, Mapping[str, Problem] |
     return problem, manifest.problems_by_format(problem)
 
 
-def read_field_or_instance(path: Path, on: Path | None, command: str) -> CrossField | Instance:
+def read_field_or_instance(path: Path, on: Path | None) -> CrossField | Instance:
     """Field or instance in a file; on: file of the instance of a .rawfield.
 
-    Raises InputError for a file that holds neither, and DomainError for a domain that the command does not
-    take.
+    Raises InputError for a file that holds neither.
     """
-    from ...models.instance.instance import Instance
-
-    content = _read_content(path, on)
-    check_domain(content if isinstance(content, Instance) else content.instance, command)
-    return content
-
-
-def _read_content(path: Path, on: Path | None) -> CrossField | Instance:
     from ...models.field.file import read_field
     from ...models.instance.file import read_instance
 
@@ -75,9 +128,8 @@ def _read_content(path: Path, on: Path | None) -> CrossField | Instance:
             return read_instance(path)
         except CrossfieldError as as_instance:
             first, second = (str(error).removeprefix(f"{path}: ") for error in (as_field, as_instance))
-            raise InputError(
-                f"is neither a field ({first}) nor an instance ({second})", file=path
-            ) from as_field
+            reasons = f"as a field: {first}; as an instance: {second}"
+            raise InputError(f"is neither a field nor an instance; {reasons}", file=path) from as_field
 
 
 def check_output(path: Path, *reads: str | Path | None, force: bool) -> None:
@@ -87,12 +139,12 @@ def check_output(path: Path, *reads: str | Path | None, force: bool) -> None:
 
 def find_drawing(source: str) -> str | None:
     """Drawing below the field of a sketch or a sample; None for a mesh or an instance, which have none."""
-    from ...models.mesh.formats import MESH_READERS
+    from ...models.mesh.formats import mesh_suffix
     from ...models.sketch.samples import SAMPLES
 
     path = Path(source)
     if path.is_file():
-        return None if path.suffix.lower() in {".json", ".npz", *MESH_READERS} else source
+        return None if mesh_suffix(path) or path.suffix.lower() in {".json", ".npz"} else source
     return source if source in SAMPLES and SAMPLES[source].kind == "sketch" else None
 
 

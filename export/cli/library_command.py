@@ -8,9 +8,8 @@ from typing import Annotated
 
 import typer
 
-from .option_groups import command as command_of
-from .options import Folder, Force, PrintOptions, Processes, Seconds
-from .output import print_line, print_notice, show_progress
+from .options import RUNGS, Folder, Force, Json, LibrarySolvers, Processes, Seconds, add_command
+from .output import print_line, print_notice, print_result, show_progress
 
 library = typer.Typer(
     help="Build, check and solve a library: instances in every formulation, with best known points.",
@@ -18,14 +17,12 @@ library = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-command = partial(command_of, library)
-
 _fact = partial(typer.Option, rich_help_panel="Facts about the run")
 
 Library = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield library build` wrote.")]
 
 
-@command("build", "crossfield library build small.toml -o library")
+@add_command(library, "build", "crossfield library build small.toml -o library")
 def build_command(
     spec: Annotated[
         str,
@@ -51,7 +48,7 @@ def build_command(
             help="Folder with points, fields and certificates of others.",
         ),
     ] = None,
-    printing: PrintOptions,
+    as_json: Json = False,
 ) -> None:
     """Build a library: every instance that the specification asks for, in its formulations and formats.
 
@@ -60,29 +57,30 @@ def build_command(
     A size that is too small for a sketch is skipped with a message. A tightened entry awaits its certificate.
     library.json lists both. If an instance or entry fails, the others are built, and the exit code is 1.
 
-    --points checks solution files of {answers}; fields; and certificates of `crossfield prove`. Those that
+    --points checks solution files of solvers, fields, and certificates of `crossfield prove`. Those that
     improve an entry are kept. If a file is refused, the exit code is 1.
     """
     from dataclasses import replace
 
-    from ..library.building.build import build, records_of_changed_problems
+    from ..library.building.build import build, rebuild
     from ..library.contributions.points import add_points
     from ..library.documents.documents import existing_folder
     from ..library.plan.spec import default_spec, read_spec
 
     checked: dict[Path, list[str]] = {}
     refused: dict[Path, str] = {}
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         show("reading the specification")
         wanted = default_spec() if spec == "default" else read_spec(spec)
         wanted = replace(wanted, points=None) if search else wanted
         if points is not None:
             existing_folder(points)
         built = build(wanted, output, jobs=jobs, scheduler=scheduler, force=force, progress=show)
+        notices = built.notices
         if points is not None:
             checked, refused = add_points(built, points, show)
             if any(checked.values()):
-                built = build(wanted, output, jobs=jobs, scheduler=scheduler, progress=show)
+                built = rebuild(output, jobs=jobs, progress=show)
     waiting = sum(name.endswith("_tight") for name in built.skipped)
     too_small = {
         name: why
@@ -96,35 +94,29 @@ def build_command(
     if points is not None:
         better = sum(map(bool, checked.values()))
         line += f"; {better} of {len(checked) + len(refused)} points and certificates improve it"
-    printing.show(built.document, lambda: print_line(line))
+    print_result(built.document, lambda: print_line(line), as_json=as_json)
     for name, reason in too_small.items():
         print_notice(f"{name} is skipped: {reason}")
     for name, error in built.failed.items():
         print_notice(f"{name} failed: {error}")
-    for reason in refused.values():
-        print_notice(reason)
-    if stale := sorted({record.entry for record in records_of_changed_problems(built)}):
-        print_notice(
-            f"{output / 'ledger.json'}: records of {len(stale)} entries do not count, for their problems have"
-            f" changed since: {', '.join(stale[:3])}{', ...' if stale[3:] else ''}; measure them again with"
-            " `crossfield library solve`"
-        )
+    for text in (*notices, *refused.values()):
+        print_notice(text)
     if built.failed or refused:
         raise typer.Exit(1)
 
 
-@command("get", "crossfield library get cf_mouse_n004_exact -o models")
+@add_command(library, "get", "crossfield library get cf_mouse_n004_exact -o models")
 def get_command(
     names: Annotated[
         list[str] | None, typer.Argument(metavar="NAME...", help="Entries; by default all that are selected.")
     ] = None,
     *,
     rung: Annotated[
-        str | None, typer.Option("--rung", metavar="RUNG", help="Only entries of this rung: {rungs}.")
+        str | None, typer.Option("--rung", metavar="RUNG", help=f"Only entries of this rung: {RUNGS}.")
     ] = None,
     output: Folder,
     force: Force = False,
-    printing: PrintOptions,
+    as_json: Json = False,
 ) -> None:
     """Write model files of the library that ships, without a build: the same bytes as a build.
 
@@ -132,48 +124,42 @@ def get_command(
     Names and --rung select entries together; at least one of them is needed.
     """
     from ...models.errors import InputError
-    from ..library.building.shipped_entries import entries, entry, write_entries
+    from ..library.building.shipped_entries import entries, write_entries
 
     if not names and rung is None:
         raise InputError("no entry is selected; name entries, or select them with --rung")
-    asked = {entry(name).name for name in names or []}
-    chosen = [one for one in entries(rung=rung) if not asked or one.name in asked]
+    chosen = entries(*names or (), rung=rung)
     if not chosen:
         raise InputError("no entry of the library that ships is selected; relax --rung")
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         written = write_entries(output, chosen, force=force, progress=show)
     number = sum(map(len, written.values()))
-    printing.show(written, lambda: print_line(f"{output}: {number} files of {len(written)} entries"))
+    print_result(
+        written, lambda: print_line(f"{output}: {number} files of {len(written)} entries"), as_json=as_json
+    )
 
 
-@command("solve", "crossfield library solve library --solver highs --time-limit 2")
+@add_command(library, "solve", "crossfield library solve library --solver highs --time-limit 2")
 def solve_command(
     folder: Library,
     *,
-    solver: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--solver",
-            metavar="NAME",
-            help="{all solvers}; those that are installed by default, may be repeated.",
-        ),
-    ] = None,
+    solver: LibrarySolvers = None,
     time_limit: Seconds = 10.0,
     up_to: Annotated[
         str | None,
-        typer.Option("--up-to", metavar="RUNG", help="Largest rung (class of sizes) to solve: {rungs}."),
+        typer.Option("--up-to", metavar="RUNG", help=f"Largest rung (class of sizes) to solve: {RUNGS}."),
     ] = None,
     by: Annotated[
         str | None,
         _fact("--by", metavar="TEXT", help="Name of the person who runs them, for the ledger."),
     ] = None,
     machine: Annotated[str | None, _fact("--machine", metavar="TEXT", help="Processor and memory.")] = None,
-    printing: PrintOptions,
+    as_json: Json = False,
 ) -> None:
     """Run the installed solvers on a library and add bounds, times and better points to its ledger.json."""
     from ..library.contributions.solve import solve_library
 
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         records = solve_library(
             folder,
             solvers=solver,
@@ -186,15 +172,15 @@ def solve_command(
     failed = sum(record["status"] == "no point" for record in records)
     without = f", {failed} from runs without a point" if failed else ""
     line = f"{folder / 'ledger.json'}: {len(records)} new records{without}"
-    printing.show(records, lambda: print_line(line))
+    print_result(records, lambda: print_line(line), as_json=as_json)
 
 
-@command("verify", "crossfield library verify library")
+@add_command(library, "verify", "crossfield library verify library")
 def verify_command(
     folder: Library,
     *,
     jobs: Processes = 1,
-    printing: PrintOptions,
+    as_json: Json = False,
 ) -> None:
     """Check a library: build it again from its own inputs, compare every file, and check its points.
 
@@ -204,10 +190,12 @@ def verify_command(
 
     from ..library.building.verification import verify_library
 
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         defects = verify_library(folder, jobs=jobs, progress=show)
     result = f"defects: {len(defects)}" if defects else "no defects found"
-    printing.show([asdict(defect) for defect in defects], lambda: print_line(f"{folder}: {result}"))
+    print_result(
+        [asdict(defect) for defect in defects], lambda: print_line(f"{folder}: {result}"), as_json=as_json
+    )
     for defect in defects:
         print_notice(str(defect))
     if defects:

@@ -1,9 +1,10 @@
-"""Arguments and options of the commands; names in braces are filled from the tables when help is shown."""
+"""Declaration of the commands, and their arguments and options."""
 
 from __future__ import annotations
 
+import inspect
+import re
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final, Literal
@@ -11,10 +12,10 @@ from typing import Annotated, Any, Final, Literal
 import typer
 
 from ...models.processes.job_counts import MOST
-from .output import print_json, print_line, show_facts
 
-_SKETCH: Final = "a drawing (SVG, .scap, .curves) or bitmap; a built-in sample: {samples};"
-_SAVED: Final = "or an instance file (.json, .npz)."
+# Literal names, because help loads no tables; tests/export/cli/test_help.py compares them.
+_SOLVERS: Final = "gurobi, cplex, xpress, highs, scip, baron, ipopt, bonmin, gams-cplex, cbc, glpk"
+RUNGS: Final = "tiny, small, medium, large, mesh"
 
 _output = partial(typer.Option, rich_help_panel="Output")
 _folder = partial(_output, "-o", "--output", metavar="DIR")
@@ -32,16 +33,29 @@ def _norm_option(option: str, terms: str) -> Any:
     return _formulating(option, min=1, max=2, help=words)
 
 
+def add_command(app: typer.Typer, name: str, example: str) -> Callable[[Callable[..., None]], Any]:
+    """Decorator that adds a function to the app as a command of this name; the example ends its help."""
+
+    def add(function: Callable[..., None]) -> Any:
+        text = re.sub(r"(?<!\n)\n(?!\n)", " ", inspect.getdoc(function) or "")  # lines begin no paragraphs
+        return app.command(name, help=text, epilog=f"Example: {example}")(function)
+
+    return add
+
+
 # Input and output
 
-_ANY: Final = f"One of: {_SKETCH} a triangle mesh ({{meshes}}), or a built-in one: {{mesh samples}}; {_SAVED}"
+_ANY: Final = (
+    "A drawing (SVG, .scap, .curves) or bitmap; a triangle mesh (.obj, .ply, .off, .stl); an instance file"
+    " (.json, .npz); or the name of a built-in sample, which `crossfield list` lists."
+)
 Input = Annotated[str, typer.Argument(metavar="SKETCH|SAMPLE|MESH|INSTANCE", help=_ANY)]
 OptionalInput = Annotated[str | None, typer.Argument(metavar="[SKETCH|SAMPLE|MESH|INSTANCE]", help=_ANY)]
 FieldOrInput = Annotated[
     str,
     typer.Argument(
         metavar="FIELD|SKETCH|SAMPLE|INSTANCE",
-        help=f"A field (.npz, .json, .rawfield); or the input for a new field: {_SKETCH} {_SAVED}",
+        help="File of a field (.npz, .json), or what `solve` takes, for its field of the method bend.",
     ),
 ]
 FieldOrInstance = Annotated[
@@ -54,7 +68,8 @@ SolutionFile = Annotated[
     Path,
     typer.Argument(
         metavar="SOLUTION",
-        help="Solution file of {answers}, plain or .gz; the kind is detected from the content.",
+        help="Solution file of a solver, plain or .gz; the kind is detected from the content."
+        " `crossfield list` lists the kinds.",
     ),
 ]
 Exported = Annotated[Path, typer.Argument(metavar="DIR", help="Folder that `crossfield export` wrote.")]
@@ -106,34 +121,112 @@ Check = Annotated[
     Path | None,
     typer.Option("--check", metavar="FILE", help="Only check this certificate and print what it proves."),
 ]
-Quiet = Annotated[bool, _output("-q", "--quiet", help="Print nothing but errors.")]
 Json = Annotated[bool, _output("--json", help="Print the result as JSON.")]
 
+# Reading of sketches and meshes
 
-@dataclass(frozen=True)
-class PrintOptions:
-    """Options for the result on standard output."""
+_sketch = partial(typer.Option, rich_help_panel="Sketch")
+_mesh = partial(typer.Option, rich_help_panel="Mesh")
 
-    quiet: Quiet = False
-    as_json: Json = False
-
-    def show(self, document: object, show: Callable[[], None]) -> None:
-        """Print the document as JSON, call the function that shows it, or do nothing if quiet."""
-        if self.as_json:
-            print_json(document)
-        elif not self.quiet:
-            show()
-
-    def show_facts(self, title: str, facts: dict[str, Any], *lines: str) -> None:
-        """Print facts as JSON, or as a table with some lines below, or do nothing if quiet."""
-
-        def show() -> None:
-            show_facts(title, facts)
-            for line in lines:
-                print_line(line)
-
-        self.show(facts, show)
-
+Size = Annotated[int | None, _sketch("--size", help="Pixels on the longer side of the grid; 24 by default.")]
+Mask = Annotated[
+    Path | None,
+    _sketch(
+        "--mask",
+        metavar="FILE",
+        help="Picture of the same size as the sketch, white where the field is wanted.",
+    ),
+]
+Silhouette = Annotated[
+    Literal["none", "outer"],
+    _sketch(
+        "--silhouette",
+        help="Strokes along the outline of the drawing carry no direction (outer), or are curvature lines"
+        " like all others (none).",
+    ),
+]
+Curvature = Annotated[
+    list[str] | None,
+    _sketch(
+        "--curvature",
+        metavar="LABEL",
+        help="Label of the strokes that are curvature lines, such as colour=red, class=flow, id=group2,"
+        " layer=Flow (SVG) or cluster=3 (.scap). Other strokes cut the field. May be repeated; by default"
+        " red strokes, or all strokes of a drawing in one colour.",
+    ),
+]
+View = Annotated[
+    str | None,
+    _sketch(
+        "--view",
+        metavar="VIEW",
+        help="Viewpoint of a .curves file: front, side, top, or azimuth and elevation in degrees, as in"
+        " 30,25; by default the view in which the strokes extend furthest.",
+    ),
+]
+StrokeWeight = Annotated[
+    float | None,
+    _sketch(
+        "--stroke-weight",
+        metavar="X",
+        help="Weight of the distance from the strokes, 0 to 1,000,000 (to less on grids below 24"
+        " pixels), the same on every grid; by default 20, or the weight in the instance"
+        " file.",
+    ),
+]
+Sharp = Annotated[
+    float | None,
+    _mesh(
+        "--sharp",
+        metavar="DEGREES",
+        help="Strokes along the edges of a mesh whose faces meet at this angle or more, 0 (all edges) to 180;"
+        " by default only boundaries, and the polylines of an .obj, are strokes.",
+    ),
+]
+Boundary = Annotated[
+    bool | None,
+    _mesh(
+        "--boundary/--no-boundary",
+        help="Whether boundary edges of a mesh are strokes; by default they are.",
+        show_default=False,
+    ),
+]
+Directions = Annotated[
+    Path | None,
+    _mesh(
+        "--directions",
+        metavar="FILE",
+        help="More strokes of a mesh: a table face,x,y,z or face,x,y,z,weight (CSV) of directions in space,"
+        " faces from 0 and weights from 0 to 1; the first vectors of a .rawfield or .rosy; or the edges of a"
+        " .sharp of QuadWild.",
+    ),
+]
+Weights = Annotated[
+    Literal["unit", "dual"],
+    _mesh(
+        "--weights",
+        help="Weights of neighbouring faces in the smoothness: all 1 (unit), or the length of their edge"
+        " over the distance of their centres (dual).",
+    ),
+]
+Merge = Annotated[
+    float | None,
+    _mesh(
+        "--merge",
+        metavar="DISTANCE",
+        help="Join vertices of the boundary of a mesh up to this distance, 0 for those at the same place; by"
+        " default only a warning reports them. Faces keep their order.",
+    ),
+]
+SharpWeight = Annotated[
+    float | None,
+    _mesh(
+        "--sharp-weight",
+        metavar="X",
+        help="Factor of the weight of two faces with strokes along their common edge, above 0, up to"
+        " 1,000,000; by default 1. A small one, such as 1e-6, lets crosses on both sides turn apart.",
+    ),
+]
 
 # Formulations and formats
 
@@ -159,21 +252,32 @@ ResidualLimits = Annotated[
         "stays.",
     ),
 ]
+Indices = Annotated[
+    Path | None,
+    _formulating(
+        "--indices",
+        metavar="FILE",
+        help="Indices that vertices of a mesh must have: a .sings, with a line `4 N` and N lines of a vertex,"
+        " from 0, and four times its index. Only miqp-cycle and milp-cycle take them.",
+    ),
+]
 FormulationName = Annotated[
-    str | None, _formulation(help="Solve this formulation: {formulations}; in short {short names}.")
+    str | None, _formulation(help="Solve this formulation; `crossfield list` has their full and short names.")
 ]
 FormulationNames = Annotated[
     list[str] | None,
-    _formulation(help="{formulations}; in short {short names}; all by default, may be repeated."),
+    _formulation(
+        help="Full or short name of a formulation in `crossfield list`; all by default, may be repeated."
+    ),
 ]
 FormatNames = Annotated[
     list[str] | None,
     typer.Option(
-        "-F", "--format", metavar="NAME", help="{formats}; {default formats} by default, may be repeated."
+        "-F",
+        "--format",
+        metavar="NAME",
+        help="nl, gms, lp, mps, mod, osil, qplib, bar; the first four by default, may be repeated.",
     ),
-]
-NlForm = Annotated[
-    Literal["text", "binary"] | None, typer.Option("--nl-form", help="AMPL .nl files as text or binary.")
 ]
 Gzip = Annotated[bool, typer.Option("--gzip", help="Compress the model files (.gz).")]
 
@@ -181,14 +285,14 @@ Gzip = Annotated[bool, typer.Option("--gzip", help="Compress the model files (.g
 
 MethodName = Annotated[
     str | None,
-    _method(help="Compute the field with a method of: {methods}. `crossfield list` describes them."),
+    _method(help="greedy, power, polyvector, bend, search or two-stage; `crossfield list` describes them."),
 ]
 SolverName = Annotated[
     str | None,
     typer.Option(
         "--solver",
         metavar="NAME",
-        help="{all solvers}; by default one of {bundled solvers} that suits the formulation.",
+        help=f"{_SOLVERS}; by default one of highs, ipopt, bonmin that suits the formulation.",
     ),
 ]
 ProgramNames = Annotated[
@@ -197,7 +301,16 @@ ProgramNames = Annotated[
         "-p",
         "--program",
         metavar="NAME",
-        help="{programs}; by default all that are installed, may be repeated.",
+        help="highs, gurobi, cplex, xpress, scip, cbc, glpk, casadi, gams; by default all that are installed,"
+        " may be repeated.",
+    ),
+]
+LibrarySolvers = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--solver",
+        metavar="NAME",
+        help=f"{_SOLVERS}; those that are installed by default, may be repeated.",
     ),
 ]
 Seconds = Annotated[float, _time_limit(help="Seconds for each solve.")]
@@ -302,8 +415,8 @@ SkewWeight = Annotated[
     typer.Option(
         "--skew-weight",
         metavar="X",
-        help="Weight of the skew beta, 0 to {most weight} (to less on grids below 24 pixels), the same on"
-        " every grid; by default {skew weight}, or the weight in the instance file.",
+        help="Weight of the skew beta, 0 to 1,000,000 (to less on grids below 24 pixels), the same on"
+        " every grid; by default 1e-06, or the weight in the instance file.",
     ),
 ]
 Processes = Annotated[int, _jobs(help="Number of processes that work in parallel.")]
@@ -319,8 +432,8 @@ Kind = Annotated[
     typer.Option(
         "--kind",
         metavar="NAME",
-        help="{pictures}; by default layers for a field as SVG or with --underlay, otherwise what the file"
-        " contains.",
+        help="instance, crosses, field, angle, overview or layers; by default layers for a field as SVG or"
+        " with --underlay, otherwise what the file contains.",
     ),
 ]
 Underlay = Annotated[
@@ -331,6 +444,10 @@ Underlay = Annotated[
         help="Drawing or sample from which the instance was read, to show its strokes. A .curves file is"
         " shown from the view that the instance records.",
     ),
+]
+Up = Annotated[
+    Literal["x", "y", "z"] | None,
+    typer.Option("--up", help="Axis of a mesh that points upwards; by default z."),
 ]
 Flip = Annotated[
     bool,
@@ -348,15 +465,6 @@ Hints = Annotated[
         " counter-clockwise from the right. May be repeated.",
     ),
 ]
-Lamp = Annotated[
-    str | None,
-    typer.Option(
-        "--light",
-        metavar="AZIMUTH,ELEVATION",
-        help="Direction of the light in degrees: counter-clockwise from the right, and 0 to 90 above the"
-        " plane of the drawing; {light} by default.",
-    ),
-]
 PictureSide = Annotated[
     int | None,
     typer.Option(
@@ -364,6 +472,6 @@ PictureSide = Annotated[
         min=1,
         metavar="PIXELS",
         help="Pixels on the longer side of the pictures; by default those of a sketch that is a picture,"
-        " and about {picture side} for others.",
+        " and about 1024 for others.",
     ),
 ]

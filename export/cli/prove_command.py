@@ -4,20 +4,18 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import typer
 
 from ...models.errors import CrossfieldError
-from ...models.written_files import is_unchanged, kept_notice
+from ...models.written_files import kept_notice
 from . import options
-from .inputs import find_drawing, read_start
-from .output import print_line, print_notice, show_facts, show_progress
-from .sketch_options import Size, SketchOptions
+from .inputs import find_drawing, read_source, read_start
+from .output import print_facts, print_notice, show_progress
 
 if TYPE_CHECKING:
     from ...models.field.field import Norm as NormOfField
-    from ...models.instance.instance import Instance
     from ...models.proof.descent.record import Claim, Proof
     from ...models.storage import NewResults
 
@@ -33,13 +31,13 @@ def prove_command(
     output: options.ProofFolder = None,
     *,
     norm: options.Norm = "2",
-    size: Size = None,
+    size: options.Size = None,
     start: options.Start = None,
     time_limit: options.SecondsOfProof = 60.0,
     gap: options.ProofGap = 0.0,
     check: options.Check = None,
     force: options.Force = False,
-    printing: options.PrintOptions,
+    as_json: options.Json = False,
 ) -> None:
     """Compute a field and prove how far its energy can be from the minimum.
 
@@ -50,7 +48,7 @@ def prove_command(
     if check is not None:
         if source is not None or output is not None:
             raise typer.BadParameter("give --check FILE alone: the certificate contains the instance")
-        _check_certificate(check, printing)
+        _check_certificate(check, as_json=as_json)
         return
     if source is None or output is None:
         raise typer.BadParameter("give a sketch, a sample or an instance, and -o DIR; or --check FILE")
@@ -58,10 +56,11 @@ def prove_command(
     from ...models.proof.prove import prove
     from ...models.storage import replace_results
 
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         show("reading the sketch")
-        instance = SketchOptions(size).read(source, "prove", quiet=printing.quiet)
-        names = ProofNames.of(instance)
+        instance = read_source(source, sketch={"size": size})
+        endings = ("field.npz", "certificate.npz", "json")
+        names = ProofNames(*(f"{instance.name}.proof.{ending}" for ending in endings))
         reads = [path for path in (find_drawing(source), start) if path is not None]
         with replace_results(output, names, reads=reads, force=force) as new:
             proof = prove(
@@ -73,18 +72,14 @@ def prove_command(
             )
             document, failure = _write_proof(proof, new.path, names)
             if not force:
-                _keep_better(new, proof, names, document)
-    printing.show(document, lambda: _show_proof(proof, document, output))
+                _keep_better(new, proof, names, None if document["status"] == UNPROVEN else document["bound"])
+    written = f"field, {'' if document['status'] == UNPROVEN else 'certificate and '}report: {output}"
+    shown = document if as_json else document | {"describes": None, "levels": None}
+    print_facts(instance.summary, shown, written, as_json=as_json)
     if instance.gauge == "box":
         print_notice("the proof is of the gauge strokes; its bound also holds in the gauge box")
     if proof.ended == "interrupted":
         print_notice("interrupted; the best field and bound so far were kept")
-    checked = len(document["levels"])
-    if 0 < checked < len(proof.levels):
-        print_notice(
-            f"the check ended early: the certificate has {checked} of {len(proof.levels)} levels, and its "
-            "bound is theirs; with a greater --time-limit it has more"
-        )
     if failure is not None:
         raise failure
 
@@ -95,12 +90,6 @@ class ProofNames(NamedTuple):
     field: str
     certificate: str
     report: str
-
-    @classmethod
-    def of(cls, instance: Instance) -> Self:
-        """Return the names for an instance."""
-        stem = f"{instance.name}.proof"
-        return cls(f"{stem}.field.npz", f"{stem}.certificate.npz", f"{stem}.json")
 
 
 def _write_proof(
@@ -118,6 +107,7 @@ def _write_proof(
         failure = error
     proven, bounds = _proven_facts(proof, certificate)
     document = proven | {
+        "describes": names.field if certificate is None else names.certificate,
         "reason": None if failure is None else str(failure),
         "seconds": proof.seconds,
         "ended": proof.ended,
@@ -126,26 +116,25 @@ def _write_proof(
             for level, bound in zip(proof.levels, bounds, strict=False)  # fewer are checked after Ctrl-C
         ],
     }
-    _write_report(document, folder / names.report)
+    (folder / names.report).write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     return document, failure
 
 
-def _write_report(document: dict[str, Any], path: Path) -> None:
-    path.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
+def _keep_better(new: NewResults, proof: Proof, names: ProofNames, bound: float | None) -> None:
+    """Keep an earlier field of less energy, and an earlier certificate of a higher bound.
 
-
-def _keep_better(new: NewResults, proof: Proof, names: ProofNames, document: dict[str, Any]) -> None:
-    """Keep an earlier field of less energy and an earlier certificate of a higher bound.
-
-    The report then has the energy of the one, and levels and bound of the other.
+    Its report stays with a certificate; without one, with the field.
     """
-    from ...models.proof.checkers.check_certificate import gap_of, status_of
+    from ...models.proof.certificate import earlier_bound
     from ..bundle.earlier import keep_better_field
 
     instance, norm = proof.field.instance, proof.norm
-    bound = None if document["status"] == UNPROVEN else document["bound"]
-    higher = _keep_better_bound(new, names.certificate, bound, on=instance, norm=norm)
-    lower = keep_better_field(
+    earlier = earlier_bound(new.folder / names.certificate, instance, norm)
+    if earlier is not None and (bound is None or earlier > bound):
+        now = "no bound" if bound is None else f"bound {bound:.6g}"
+        print_notice(kept_notice(names.certificate, f"bound {earlier:.6g}", now))
+        new.kept.update((names.certificate, names.report))
+    keep_better_field(
         new,
         names.field,
         proof.field,
@@ -153,17 +142,8 @@ def _keep_better(new: NewResults, proof: Proof, names: ProofNames, document: dic
         on=instance,
         value=lambda field: field.energy(norm).total,
     )
-    if higher is not None:
-        if is_unchanged(new.folder / names.report):
-            document.update(json.loads((new.folder / names.report).read_text("utf-8")))
-        document |= {"bound": higher, "status": "gap"}
-    if higher is not None or lower is not None:
-        energy = (lower or proof.field).energy(norm).total
-        document["energy"] = energy
-        if document["status"] != UNPROVEN:
-            document["status"] = status_of(energy, document["bound"])
-            document["gap"] = gap_of(energy, document["bound"])
-        _write_report(document, new.path / names.report)
+    if bound is None and names.field in new.kept:
+        new.kept.add(names.report)
 
 
 def _proven_facts(proof: Proof, certificate: Claim | None) -> tuple[dict[str, Any], list[float]]:
@@ -188,38 +168,13 @@ def proof_facts(source: Claim) -> dict[str, Any]:
     }
 
 
-def _show_proof(proof: Proof, document: dict[str, Any], folder: Path) -> None:
-    """Print the report without its levels, and the folder of the files."""
-    shown = {key: value for key, value in document.items() if key != "levels"}
-    show_facts(proof.field.instance.summary, shown)
-    certificate = "" if document["status"] == UNPROVEN else "certificate and "
-    print_line(f"field, {certificate}report: {folder}")
-
-
-def _check_certificate(path: Path, printing: options.PrintOptions) -> None:
+def _check_certificate(path: Path, *, as_json: bool) -> None:
     """Check a certificate and print its facts."""
     from ...models.proof.certificate import read_certificate
 
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         show("checking the certificate")
         certificate = read_certificate(path, jobs=2, progress=show)
 
-    printing.show_facts(
-        certificate.field.instance.summary, proof_facts(certificate), "the certificate is valid"
-    )
-
-
-def _keep_better_bound(
-    new: NewResults, name: str, bound: float | None, *, on: Instance, norm: NormOfField = 2
-) -> float | None:
-    """Keep an earlier certificate of a higher bound than the one proven now, if any; return that bound."""
-    from ...models.proof.certificate import earlier_bound
-
-    earlier = earlier_bound(new.folder / name, on, norm)
-    if earlier is None or (bound is not None and earlier <= bound):
-        return None
-    print_notice(
-        kept_notice(name, f"bound {earlier:.6g}", "no bound" if bound is None else f"bound {bound:.6g}")
-    )
-    new.kept.add(name)
-    return earlier
+    facts = proof_facts(certificate)
+    print_facts(certificate.field.instance.summary, facts, "the certificate is valid", as_json=as_json)

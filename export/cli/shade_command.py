@@ -2,40 +2,32 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING
 
 from ...models.errors import InputError, shortened
-from ...models.processes.deadline import Progress
 from . import options
-from .inputs import SAVED, find_drawing, read_field_or_instance
-from .output import show_progress, show_surface
-from .sketch_options import SketchOptions
+from .inputs import find_drawing, read_field_or_instance, read_source
+from .output import print_result, show_progress, show_surface
 
 if TYPE_CHECKING:
     from ...models.field.field import CrossField
-    from ...models.instance.instance import Instance
     from ...models.surface.hints import Hint
-    from ..shading.colours import Light
-
-FIELD: Final = "field.npz"
-"""File of the field that was computed from a sketch, which can be shaded again with other hints."""
 
 
 def shade_command(
     source: options.FieldOrInput,
     output: options.Folder,
     *,
+    size: options.Size = None,
     flip: options.Flip = False,
     hint: options.Hints = None,
-    light: options.Lamp = None,
     side: options.PictureSide = None,
-    on: options.On = None,
     underlay: options.Underlay = None,
     force: options.Force = False,
-    sketch: SketchOptions,
-    printing: options.PrintOptions,
+    as_json: options.Json = False,
 ) -> None:
     """Compute the surface whose curvature lines are the crosses: normals, shaded pictures, heights, mesh.
 
@@ -47,57 +39,41 @@ def shade_command(
     are printed and written to surface.json. A surface without doubts can be wrong too, most of all far from
     strokes.
     """
-    from ...models.field.file import write_field
-    from ...models.storage import replace_results
     from ...models.surface.lift import surface
+    from ...models.written_files import check_targets
     from ..pictures.underlay import read_underlay
-    from ..surfaces.files import FILES, choose_view, surface_document, write_surface
+    from ..surfaces.files import FILES, REPORT, choose_view, write_surface
 
-    hints, lamp = parse_hints(hint), parse_light(light)
-    reads = [path for path in (source, on, underlay, sketch.mask) if path is not None]
-    with show_progress(quiet=printing.quiet) as show:
-        show("reading")
-        saved = _read_saved_field(source, on)
-        if saved is not None and sketch != SketchOptions():
-            raise InputError(
-                "is a field, which has its own grid and strokes; omit the options that read a sketch",
-                file=source,
-            )
-        instance = sketch.read(source, "shade", quiet=printing.quiet) if saved is None else saved.instance
-        names = [FIELD, *FILES] if saved is None else FILES
-        with replace_results(output, names, reads=reads, force=force) as new:
-            field = saved or _compute_field(instance, show)
-            if saved is None:
-                underlay = underlay or find_drawing(source)
-                write_field(field, new.path / FIELD)
-            drawing = None if underlay is None else read_underlay(underlay, on=field.instance)
-            view = choose_view(field.instance, drawing, side)
-            solid = surface(field, hints, flip=flip, progress=show)
-            about = _describe_choices("bend" if saved is None else None, hints, lamp, flip=flip)
-            show("drawing and writing")
-            write_surface(solid, new.path, drawing=drawing, light=lamp, side=side, about=about)
-    document = surface_document(solid, view, about)
-    printing.show(document, lambda: show_surface(solid, document, output))
+    hints, underlay = parse_hints(hint), underlay or find_drawing(source)
+    check_targets(output, FILES, reads=[path for path in (source, underlay) if path is not None], force=force)
+    with show_progress() as show:
+        show("reading, and the field of bend unless it is given")
+        field = _read_or_compute_field(source, size)
+        drawing = None if underlay is None else read_underlay(underlay, on=field.instance)
+        choose_view(field.instance, drawing, side)  # checks the side before the work
+        solid = surface(field, hints, flip=flip, progress=show)
+        degrees = [[h.row, h.column, *(round(math.degrees(a), 4) for a in (h.slant, h.tilt))] for h in hints]
+        named = [dict(zip(("row", "column", "slant", "tilt"), hint, strict=True)) for hint in degrees]
+        show("drawing and writing")
+        about = {"flipped": flip, "hints": named}
+        write_surface(solid, output, drawing=drawing, side=side, about=about, force=force)
+    document = json.loads((output / REPORT).read_text("utf-8"))
+    print_result(document, lambda: show_surface(solid, document, output), as_json=as_json)
 
 
-def _read_saved_field(source: str, on: Path | None) -> CrossField | None:
-    """Field in a file; None for a sketch, sample or instance. Raises InputError."""
+def _read_or_compute_field(source: str, size: int | None) -> CrossField:
+    """The field in a file, or that of the method bend. Raises InputError."""
     from ...models.field.field import CrossField
-
-    path = Path(source)
-    if on is None and not (path.is_file() and path.suffix.lower() in SAVED):
-        return None
-    content = read_field_or_instance(path, on, "shade")
-    return content if isinstance(content, CrossField) else None
-
-
-def _compute_field(instance: Instance, show: Progress) -> CrossField:
-    """The field of the method bend."""
     from ...models.smooth.bend import bend_field
     from ...models.smooth.polyvector import HOLDS, polyvector_field
 
-    show("bend field")
-    return bend_field(polyvector_field(instance, hold=max(HOLDS)))
+    if size is None and Path(source).is_file() and source.lower().endswith((".npz", ".json")):
+        content = read_field_or_instance(Path(source), None)
+    else:
+        content = read_source(source, sketch={"size": size})
+    if isinstance(content, CrossField):
+        return content
+    return bend_field(polyvector_field(content, hold=max(HOLDS)))
 
 
 def parse_hints(texts: list[str] | None) -> tuple[Hint, ...]:
@@ -106,47 +82,12 @@ def parse_hints(texts: list[str] | None) -> tuple[Hint, ...]:
 
     hints = []
     for text in texts or ():
-        row, column, slant, tilt = _parse_numbers(text, "--hint ROW,COLUMN,SLANT,TILT", "12,30,45,90")
-        if row % 1 or column % 1:
+        try:
+            row, column, slant, tilt = text.split(",")
+            hint = Hint(int(row), int(column), math.radians(float(slant)), math.radians(float(tilt)))
+        except ValueError as error:
             raise InputError(
-                f"--hint {shortened(text)}: row and column must be whole numbers, as in 12,30,45,90"
-            )
-        hints.append(Hint(int(row), int(column), math.radians(slant), math.radians(tilt)))
+                f"--hint {shortened(text)!r} is malformed; give ROW,COLUMN,SLANT,TILT as in 12,30,45,90"
+            ) from error
+        hints.append(hint)
     return tuple(hints)
-
-
-def parse_light(text: str | None) -> Light:
-    """Light from a text in degrees, or from the upper left. Raises InputError for a malformed text."""
-    from ..shading.colours import UPPER_LEFT, Light
-
-    if text is None:
-        return UPPER_LEFT
-    azimuth, elevation = _parse_numbers(text, "--light AZIMUTH,ELEVATION", "135,45")
-    return Light(math.radians(azimuth), math.radians(elevation))
-
-
-def _parse_numbers(text: str, option: str, example: str) -> list[float]:
-    """Finite numbers separated by commas, as many as in the example. Raises InputError."""
-    try:
-        numbers = [float(part) for part in text.split(",")]
-    except ValueError:
-        numbers = []
-    if len(numbers) != len(example.split(",")) or not all(map(math.isfinite, numbers)):
-        raise InputError(f"{option}: {shortened(text)!r} is malformed; give numbers as in {example}")
-    return numbers
-
-
-def _describe_choices(
-    method: str | None, hints: tuple[Hint, ...], lamp: Light, *, flip: bool
-) -> dict[str, Any]:
-    """Method, hints and light of a surface, for its report; angles in degrees."""
-    return {
-        "method": method,
-        "flipped": flip,
-        "hints": [
-            {"row": hint.row, "column": hint.column}
-            | {name: round(math.degrees(getattr(hint, name)), 4) for name in ("slant", "tilt")}
-            for hint in hints
-        ],
-        "light": {name: round(math.degrees(getattr(lamp, name)), 4) for name in ("azimuth", "elevation")},
-    }

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import typer
 
 from ...models.errors import InputError, SolutionError
 from ...models.processes.deadline import Deadline
 from . import options
-from .inputs import check_names, find_drawing, full_formulation_names, read_start
-from .output import print_notice, show_progress
-from .sketch_options import Size, SketchOptions
+from .inputs import check_names, find_drawing, full_formulation_names, read_source, read_start
+from .output import print_facts, print_notice, show_progress
 
 if TYPE_CHECKING:
     from ..runs.methods import Candidate, Request
@@ -27,13 +26,13 @@ def solve_command(
     formulation: options.FormulationName = None,
     method: options.MethodName = None,
     solver: options.SolverName = None,
-    size: Size = None,
+    size: options.Size = None,
     relax: options.Relax = False,
     start: options.Start = None,
     time_limit: options.SecondsInAll = 60.0,
     threads: options.Threads = 0,
     force: options.Force = False,
-    printing: options.PrintOptions,
+    as_json: options.Json = False,
 ) -> None:
     """Compute a field by a method (-m), or solve one formulation with a solver (-f).
 
@@ -46,9 +45,9 @@ def solve_command(
 
     if (formulation is None) == (method is None):
         raise typer.BadParameter("give either --method NAME or --formulation NAME")
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         show("reading the sketch")
-        instance = SketchOptions(size).read(source, "solve", quiet=printing.quiet)
+        instance = read_source(source, sketch={"size": size})
         request = Request(
             instance,
             output,
@@ -56,16 +55,18 @@ def solve_command(
             progress=show,
             limits=Limits(time_limit, threads=threads).until(deadline),
         )
-        placing = _Placing([path for path in (find_drawing(source), start) if path is not None], force)
+        reads = [path for path in (find_drawing(source), start) if path is not None]
         if method is not None:
             _check_method(method, solver, relax=relax)
-            candidate, target = _solve_by_method(method, request, placing)
+            candidate, target = _solve_by_method(method, request, reads, force=force)
         else:
-            solution, target = _solve_by_solver(str(formulation), solver, request, placing, relax=relax)
+            solution, target = _solve_by_solver(
+                str(formulation), solver, request, reads, relax=relax, force=force
+            )
     if method is not None:
-        _print_candidate(candidate, target, printing)
+        _print_candidate(candidate, target, as_json=as_json)
         return
-    print_solution(solution, target, printing)
+    print_solution(solution, target, as_json=as_json)
     if solution.point is None:
         words = f"{solution.status}: {solution.message}" if solution.message else str(solution.status)
         raise InputError(
@@ -86,20 +87,13 @@ def _check_method(name: str, solver: str | None, *, relax: bool) -> None:
     check_names([name], METHODS, "method")
     if name == "prove":
         raise typer.BadParameter("the method prove has a command of its own; write crossfield prove")
-    if relax:
-        raise typer.BadParameter("--relax needs --formulation; methods do not take it")
-    if solver is not None:
-        raise typer.BadParameter(f"--solver {solver}: the method {name} has its own solvers")
+    if relax or solver is not None:
+        raise typer.BadParameter("--relax and --solver need --formulation; no method takes them")
 
 
-class _Placing(NamedTuple):
-    """Treatment of files in the way: files that are read, and whether others are replaced."""
-
-    reads: list[str | Path]
-    force: bool
-
-
-def _solve_by_method(name: str, request: Request, placing: _Placing) -> tuple[Candidate, Path]:
+def _solve_by_method(
+    name: str, request: Request, reads: list[str | Path], *, force: bool
+) -> tuple[Candidate, Path]:
     """Final field of a method, and its file."""
     from ...models.field.file import write_field
     from ...models.storage import replace_results
@@ -110,10 +104,10 @@ def _solve_by_method(name: str, request: Request, placing: _Placing) -> tuple[Ca
     method = find_method(name, instance)
     field = f"{instance.name}.{name}.field.npz"
     names = [*method.file_names(instance), field]
-    with replace_results(folder, names, reads=placing.reads, force=placing.force) as new:
+    with replace_results(folder, names, reads=reads, force=force) as new:
         *_, candidate = method.find(replace(request, folder=new.path))
         write_field(candidate.field, new.path / field)
-        if not placing.force:
+        if not force:
             keep_better_field(new, field, candidate.field, print_notice, on=instance)
         if field in new.kept:
             new.kept.update(names)
@@ -121,7 +115,7 @@ def _solve_by_method(name: str, request: Request, placing: _Placing) -> tuple[Ca
 
 
 def _solve_by_solver(
-    name: str, solver: str | None, request: Request, placing: _Placing, *, relax: bool
+    name: str, solver: str | None, request: Request, reads: list[str | Path], *, relax: bool, force: bool
 ) -> tuple[Solution, Path]:
     """Solution of one formulation, and the path of its field, which exists if the solution has a point."""
     from ...models.formulations.problem import formulate
@@ -135,7 +129,7 @@ def _solve_by_solver(
     field = f"{instance.name}.{name}.field.npz"
     for possible in [solver] if solver in SOLVERS else BUNDLED:
         names = names_of_solve(instance, name, possible, SOLVERS[possible].formats)
-        check_targets(folder, [*names, field], reads=placing.reads, force=placing.force)
+        check_targets(folder, [*names, field], reads=reads, force=force)
     request.progress("greedy start")
     start = request.starting_field(deadline)
     problem = formulate(instance, name, p=jumps_as_data(instance, name, start), relax=relax)
@@ -149,22 +143,22 @@ def _solve_by_solver(
             folder=folder,
             limits=limits,
             start=start,
-            force=placing.force,
-            reads=placing.reads,
+            force=force,
+            reads=reads,
             field_name=field,
             notice=print_notice,
         )
     return solution, folder / field
 
 
-def _print_candidate(candidate: Candidate, field: Path, printing: options.PrintOptions) -> None:
+def _print_candidate(candidate: Candidate, field: Path, *, as_json: bool) -> None:
     """Print the facts of a method's field and the path of its file."""
-    printing.show_facts(candidate.field.instance.summary, candidate.facts(), f"field: {field}")
+    print_facts(candidate.field.instance.summary, candidate.facts(), f"field: {field}", as_json=as_json)
     if candidate.interrupted:
         print_notice("interrupted; the best field so far was kept")
 
 
-def print_solution(solution: Solution, field: Path, printing: options.PrintOptions) -> None:
+def print_solution(solution: Solution, field: Path, *, as_json: bool) -> None:
     """Print the facts of a solution, and the path of its field, which exists unless there is a doubt."""
     facts = solution.facts()
     if solution.point is not None:
@@ -172,6 +166,6 @@ def print_solution(solution: Solution, field: Path, printing: options.PrintOptio
     written = solution.point is not None and not solution.doubt
 
     lines = [f"field: {field}"] if written else []
-    printing.show_facts(solution.problem.instance.summary, facts, *lines)
+    print_facts(solution.problem.instance.summary, facts, *lines, as_json=as_json)
     if solution.interrupted:
         print_notice("interrupted; the best point so far was kept" if written else "interrupted")

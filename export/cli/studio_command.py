@@ -11,7 +11,6 @@ from typing import Annotated, Any
 import typer
 
 from ...models.errors import InputError
-from .mesh_options import is_mesh_file
 from .output import print_line, show_progress
 
 
@@ -65,7 +64,6 @@ def _read_strokes(drawing: str) -> dict[str, Any]:
     path = Path(drawing)
     if not path.is_file() and drawing in SAMPLES:
         return open_drawing(sample_svg(drawing).encode(), f"{drawing}.svg")
-    is_mesh_file(path, "studio")  # raises an error for a mesh
     data = read_file(path)
     with naming(path):
         return open_drawing(data, path.name)

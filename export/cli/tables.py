@@ -5,14 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from ...models.errors import UnsupportedByFormatError
-from ...models.formulations.catalogue import FORMULATIONS, declare
+from ...models.formulations.catalogue import FORMULATIONS
+from ...models.formulations.choice import declare
 from ...models.formulations.problem import Problem
 from ...models.samples.samples import samples
 from ..formats.registry import FORMATS, problem_in_format
 from ..runs.methods import METHODS
 from ..solutions.readers.registry import READERS
-from ..solvers_table import BUNDLED, PROGRAMS, smallest_problem, suitabilities
-from ..solving.local import choose_format
+from ..solvers_table import PROGRAMS, smallest_problem, suitabilities
 
 Row = dict[str, Any]
 
@@ -26,8 +26,7 @@ def tables() -> dict[str, list[Row]]:
         ],
         "formulations": [_formulation_row(problem) for problem in problems],
         "formats": [_format_row(name) for name in FORMATS],
-        "solvers": [_solver_row(problem, relaxed) for problem, relaxed in _list_relaxations()],
-        "externals": [_external_row(problem) for problem in problems],
+        "solvers": [_solver_row(problem) for problem in problems],
         "methods": [{"name": method.name, "summary": method.summary} for method in METHODS.values()],
         "readers": [{"name": reader.name, "description": reader.description} for reader in READERS],
     }
@@ -36,15 +35,6 @@ def tables() -> dict[str, list[Row]]:
 def smallest_problems() -> list[Problem]:
     """Every formulation on an instance of two pixels."""
     return [smallest_problem(declare(name)) for name in FORMULATIONS]
-
-
-def _list_relaxations() -> list[tuple[Problem, bool]]:
-    rows: list[tuple[Problem, bool]] = []
-    for name, recipe in FORMULATIONS.items():
-        rows.append((smallest_problem(declare(name)), False))
-        if "relax" in recipe.option_names:
-            rows.append((smallest_problem(declare(name, relax=True)), True))
-    return rows
 
 
 def _formulation_row(problem: Problem) -> Row:
@@ -68,18 +58,11 @@ def _format_row(name: str) -> Row:
     return {
         "name": name,
         "written": "by default" if entry.is_default else "when asked for",
-        "dialects": ", ".join(filter(None, entry.dialects)),
         "verified by": ", ".join(readers) or "none",
         "summary": entry.summary,
     }
 
 
-def _solver_row(problem: Problem, relaxed: bool) -> Row:
-    taking = {name: choose_format(problem, name) for name in BUNDLED}
-    answers = {name: "yes" if answer.answer == "yes" else answer.reason for name, answer in taking.items()}
-    return {"formulation": f"{problem.name}, relaxed" if relaxed else problem.name} | answers
-
-
-def _external_row(problem: Problem) -> Row:
+def _solver_row(problem: Problem) -> Row:
     answers = {name: taking.reason or taking.answer for name, taking in suitabilities(problem).items()}
     return {"formulation": problem.name} | answers

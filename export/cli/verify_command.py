@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import typer
 
 from . import options
 from .inputs import check_names
-from .output import print_line, print_notice, show_progress, show_table
+from .output import print_line, print_notice, print_result, show_progress, show_table
 
 if TYPE_CHECKING:
     from ..verify.checks import Verification
@@ -20,7 +21,7 @@ def verify_command(
     solve: options.SolveSeconds = None,
     program: options.ProgramNames = None,
     force: options.Force = False,
-    printing: options.PrintOptions,
+    as_json: options.Json = False,
 ) -> None:
     """Read every exported file with every installed solver, and compare the result with the problem.
 
@@ -31,9 +32,9 @@ def verify_command(
     from ..verify.verify import verify
 
     programs = check_names(program, PROGRAMS, "program")
-    with show_progress(quiet=printing.quiet) as show:
+    with show_progress() as show:
         verification = verify(folder, seconds=solve, programs=programs, force=force, progress=show)
-    printing.show(verification.document(), lambda: _show_verification(verification))
+    print_result(verification.document(), lambda: _show_verification(verification), as_json=as_json)
     for check in verification.failed_checks:
         print_notice(f"{check.file}: {check.program}: {check.verdict}: {check.reason}")
     if not verification.is_ok:
@@ -42,16 +43,14 @@ def verify_command(
 
 def _show_verification(verification: Verification) -> None:
     """Print the number of files by program, step and verdict, and the absent programs."""
-    verdicts = list(dict.fromkeys(check.verdict for check in verification.checks))
+    checks = verification.checks
+    counts = Counter((check.program, check.step, check.verdict) for check in checks)
+    verdicts = list(dict.fromkeys(check.verdict for check in checks))
     columns = ("program", "step", *map(str, verdicts))
-    rows = []
-    for program, step in dict.fromkeys((check.program, check.step) for check in verification.checks):
-        mine = [
-            result.verdict
-            for result in verification.checks
-            if (result.program, result.step) == (program, step)
-        ]
-        rows.append([program, step, *(str(mine.count(verdict) or "-") for verdict in verdicts)])
+    rows = [
+        [*row, *(str(counts[*row, verdict] or "-") for verdict in verdicts)]
+        for row in dict.fromkeys((check.program, check.step) for check in checks)
+    ]
     show_table(f"files in {verification.folder}", columns, rows, numbers=columns[2:])
     for why in verification.absent.values():
         print_line(f"not used: {why}")

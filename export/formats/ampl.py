@@ -148,7 +148,7 @@ def generate_data(problem: Problem, header: list[str]) -> Iterator[bytes]:
         weights["w_beta"] = instance.skew_coefficient
     lines = "\n".join(f"param {name} := {number_text(value)};" for name, value in weights.items())
     yield b";\n" + lines.encode() + b"\n"
-    yield from _pairs_of_faces(instance)
+    yield from _pairs(instance)
     if problem.jumps is not None and len(problem.jumps):
         at = np.nonzero(problem.jumps)[0]
         yield b"param p :=\n"
@@ -216,19 +216,21 @@ def _points(instance: Instance) -> Iterator[bytes]:
         yield from render([b"(", Decimals(rows), b",", Decimals(columns), b")\n"], len(rows))
 
 
-def _pairs_of_faces(instance: Instance) -> Iterator[bytes]:
-    """The pairs of a mesh, by number: both faces, kappa, and weights if there are any."""
-    domain = instance.domain
-    if not isinstance(domain, Mesh) or not len(domain.first):
+def _pairs(instance: Instance) -> Iterator[bytes]:
+    """The pairs of a mesh, by number: both faces and kappa; and weights of pairs if there are any."""
+    domain, weights = instance.domain, instance.pair_weights
+    if not len(domain.first):
         return
-    weights = instance.pair_weights
-    yield b"param: E: first second kappa%b :=\n" % (b"" if weights is None else b" omega")
-    parts: list[Piece] = [Decimals(domain.first), b" ", Decimals(domain.second), b" ", words(domain.kappa)]
+    if isinstance(domain, Mesh):
+        yield b"param: E: first second kappa :=\n"
+        faces: list[Piece] = [Decimals(domain.first), b" ", Decimals(domain.second)]
+        yield from _element_lines(instance, "pairs", [*faces, b" ", words(domain.kappa)])
+        yield b";\n"
     if weights is not None:
         check_coefficients(weights, f"pair_weights of {instance.name}")
-        parts += [b" ", words(weights)]
-    yield from _element_lines(instance, "pairs", parts)
-    yield b";\n"
+        yield b"param omega :=\n"
+        yield from _element_lines(instance, "pairs", [words(weights)])
+        yield b";\n"
 
 
 def _element_lines(

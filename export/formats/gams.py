@@ -163,7 +163,9 @@ def _equations(problem: Problem, names: Names) -> Iterator[bytes]:
 
 
 def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
-    """The terms of the objective, one line per element (more if it is long)."""
+    """The terms of the objective, one line per element (more if it is long); 0 without any."""
+    if not problem.objective:
+        yield b"  0\n"
     for family in problem.objective:
         terms = GamsExpressions(family, names).summands(family.family.body)
         yield from render([*wrap_lines(terms, WIDTH, b"  "), b"\n"], family.count)

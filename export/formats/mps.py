@@ -18,28 +18,27 @@ M-numbers: docs/format-rules.md.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...models.formulations.families import Block, Monomial, PlacedFamily
-from ...models.formulations.names import row_names, stack_names
+from ...models.formulations.families import Block, PlacedFamily
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Ints
 from ..writing.canonical import BlockBounds, CanonicalForm, coefficient
 from ..writing.names import OBJECTIVE, Names, problem_name
 from ..writing.records import (
-    OptionalPieces,
     Piece,
-    TaggedWords,
     Words,
-    check_coefficients,
+    bytes_of_texts,
     number_text,
     render,
     words,
 )
 
 _ROW_TYPES = {">=": b"G", "<=": b"L", "==": b"E"}
+_COLUMNS: Final = 1 << 17  # of a block whose entries are held at once
 
 
 def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
@@ -69,24 +68,13 @@ def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
 
 
 def _columns(form: CanonicalForm) -> Iterator[bytes]:
-    """Matrix entries column by column; a record is a column: its cost first, then by row."""
-    problem, names = form.problem, form.names
-    rows = {family.family.tag: names.row(family) for family in problem.rows}
-    markers = 0
+    """Matrix entries column by column, its cost first, then by row."""
+    problem, markers = form.problem, 0
     for integer, blocks in _integrality_runs(problem):
         if integer:
             yield f" MARKER{markers} 'MARKER' 'INTORG'\n".encode()
         for block in blocks:
-            if any(family.family.steps for family in problem.rows):
-                yield from _single_entries(form, block)
-                continue
-            name, cost = names.of(block), words(form.costs[block.slice])
-            entries = [
-                entry
-                for family in problem.rows
-                for entry in _entries(family, block, name, rows[family.family.tag])
-            ]
-            yield from render([b" ", name, b" obj ", cost, b"\n", *entries], block.count)
+            yield from _entries(form, block)
         if integer:
             yield f" MARKER{markers + 1} 'MARKER' 'INTEND'\n".encode()
             markers += 2
@@ -95,62 +83,51 @@ def _columns(form: CanonicalForm) -> Iterator[bytes]:
         yield b" %b c_ONE 1\n" % form.one
 
 
-def _single_entries(form: CanonicalForm, block: Block) -> Iterator[bytes]:
-    """Matrix entries of a block whose columns may stand in any number of rows; a record is an entry."""
-    from ...models.formulations.arrays import row_terms  # it loads SciPy, as cycles do
-
-    rows, (at, value) = form.problem.rows, row_terms(form.problem.rows, 1)
-    check_coefficients(value, "a row of cycles")
-    mine = (at[:, 1] >= block.offset) & (at[:, 1] < block.offset + block.count)
-    column = np.concatenate([np.arange(block.count), at[mine, 1] - block.offset])
-    row = np.concatenate([np.zeros(block.count, dtype=np.int64), at[mine, 0] + 1])  # costs first
-    order = np.lexsort((row, column))
-    names = Words(stack_names([np.array([list(OBJECTIVE)], dtype=np.uint8), row_names(rows)]), row[order])
-    values = words(np.concatenate([form.costs[block.slice], value[mine]])[order])
-    parts: list[Piece] = [b" ", form.names.of(block).at(column[order]), b" ", names, b" ", values, b"\n"]
-    yield from render(parts, len(order))
-
-
-def _entries(
-    family: PlacedFamily, block: Block, name: TaggedWords, rows: TaggedWords
-) -> Iterator[Piece | OptionalPieces]:
-    """The lines of a column of a block for the rows of a family, in the order of rows."""
-    terms = [term for term in family.of_degree(1) if family.block(term.symbols[0]).name == block.name]
-    lines = [line for term in terms for line in _incident_rows(family, term)]
-    for _, row, term in sorted(lines, key=lambda line: line[0]):
-        value = words(coefficient(term))
-        if row is None:
-            yield from (b" ", name, b" ", rows, b" ", value, b"\n")
-        else:
-            at_row = value if isinstance(value, bytes) else value.at(row)
-            yield OptionalPieces(row >= 0, [b" ", name, b" ", rows.at(row), b" ", at_row, b"\n"])
+def _entries(form: CanonicalForm, block: Block) -> Iterator[bytes]:
+    """Costs and matrix entries of a block of columns, a part of the block at a time to limit memory."""
+    costs, name, (places, _) = form.costs[block.slice], form.names.of(block), form.names.places
+    row_tags = (family.family.tag.encode() for family in form.problem.rows)
+    tags = bytes_of_texts(np.array([OBJECTIVE, *row_tags]))
+    for part in np.array_split(np.arange(block.count, dtype=np.int32), 1 + block.count // _COLUMNS):
+        zeros = np.zeros(len(part), dtype=np.int32)
+        of_costs = part, zeros, zeros.astype(np.uint16), zeros, costs[part]
+        entries = zip(of_costs, *_row_entries(form, block, part), strict=True)
+        column, row, tag, place, value = map(np.concatenate, entries)
+        order = np.lexsort((row, column))
+        label: list[Piece] = [Words(tags, tag[order]), places.at(place[order])]
+        number = words(value)
+        number = number if isinstance(number, bytes) else number.at(order)
+        yield from render([b" ", name.at(column[order]), b" ", *label, b" ", number, b"\n"], len(order))
 
 
-def _incident_rows(family: PlacedFamily, term: Monomial) -> list[tuple[int, Ints | None, Monomial]]:
-    """Rows of a family that contain a column of the term's block: (rank, row of each column or -1, term).
+def _row_entries(form: CanonicalForm, block: Block, part: Ints) -> Iterator[tuple[NDArray[Any], ...]]:
+    """The entries of a part of a block in rows, one linear term after the other.
 
-    None where row and column have the same number.
+    Yields arrays: the column in its block, the number of the row (from 1; the objective is row 0), the number
+    of the tag of its name and of what follows the tag, and the coefficient.
     """
-    instance, kind = family.instance, family.family.slots[term.symbols[0]][1]
-    if kind == "itself":
-        row = (
-            None
-            if family.covers_index_set
-            else _inverse_index(family.elements, family.block(term.symbols[0]).count)
-        )
-        return [(0, row, term)]
-    assert family.covers_index_set  # families on a part of the pairs have terms of only those pairs
-    if kind == "stroke":
-        return [(0, _inverse_index(instance.stroke_index, instance.domain.size), term)]
-    tables = enumerate(instance.domain.pairs_of_points)
-    return [(rank, row, term) for rank, (end, row) in tables if end == kind]
+    first, (_, begins) = 1, form.names.places
+    for tag, family in enumerate(form.problem.rows, 1):
+        for term in family.of_degree(1):
+            if family.block(term.symbols[0]).name == block.name:
+                inside = family.inside(term.symbols[0])
+                at = part if inside is None else _within(inside, part)
+                column = at if inside is None else inside[at]
+                place = at if family.covers_index_set else family.elements[at]
+                value = np.broadcast_to(coefficient(term), (family.count,))[at]
+                yield (
+                    column,
+                    at + np.int32(first),
+                    np.full(len(at), tag, dtype=np.uint16),
+                    place + np.int32(begins[family.family.over]),
+                    value,
+                )
+        first += family.count
 
 
-def _inverse_index(index: Ints, count: int) -> Ints:
-    """Place in `index` of each number below `count`, -1 if it is missing."""
-    place = np.full(count, -1, dtype=np.int32)
-    place[index] = np.arange(len(index), dtype=np.int32)
-    return place
+def _within(inside: Ints, part: Ints) -> Ints:
+    """The elements of a family whose columns are in a part of a block."""
+    return np.flatnonzero((inside >= part[0]) & (inside <= part[-1])).astype(np.int32)
 
 
 def _integrality_runs(problem: Problem) -> list[tuple[bool, list[Block]]]:

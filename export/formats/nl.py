@@ -1,4 +1,4 @@
-"""AMPL .nl, text and binary, in the subset that the AMPL Solver Library, SCIP and CasADi read alike.
+"""AMPL .nl, as text, in the subset that the AMPL Solver Library, SCIP and CasADi read alike.
 
 The order of columns and rows is that of `writing.nl_order`. Header, line by line (docs/format-rules.md):
 
@@ -40,7 +40,6 @@ from ..writing.records import (
     Hole,
     Piece,
     Pieces,
-    RawValues,
     check_coefficients,
     render,
     words,
@@ -53,85 +52,56 @@ ADD, MULTIPLY, POWER, NEGATE, COSINE, SUM = 0, 2, 5, 16, 46, 54
 Numbers = NDArray[Any] | int | float
 
 
-class TextForm:
-    """The text form: each token on its own line, its numbers apart by blanks."""
-
-    letter, arithmetic = b"g", 0
-    padded = True
-
-    def number(self, value: Numbers) -> bytes | Hole:
-        """A number within a token, decimal if it is whole by its type."""
-        if isinstance(value, int):
-            return str(value).encode()
-        values = np.asarray(value)
-        return Decimals(values) if values.dtype.kind == "i" else words(values)
-
-    def token(self, name: bytes, *numbers: Numbers) -> list[Piece]:
-        """A letter with numbers, numbers alone, or a digit with numbers, which then stand apart from it."""
-        parts: list[Piece] = [name] if name else []
-        for place, value in enumerate(numbers):
-            parts += [b" "] if place or name.isdigit() else []
-            parts.append(self.number(value))
-        return [*parts, b"\n"]
-
-    def constant(self, value: Floats | float) -> list[Piece]:
-        """A number in an expression."""
-        return self.token(b"n", np.asarray(value, dtype=np.float64))
-
-    def records(self, parts: Pieces, count: int = 1) -> Iterator[bytes]:
-        """The bytes of that many records."""
-        return render(parts, count, padded=self.padded)
-
-    def sum(self, count: int) -> list[Piece]:
-        """The operator for the sum of two summands or more."""
-        if count == 2:
-            return self.token(b"o", ADD)
-        return [*self.token(b"o", SUM), *self.token(b"", count)]
+def _number(value: Numbers) -> bytes | Hole:
+    """A number within a token, decimal if it is whole by its type."""
+    if isinstance(value, int):
+        return str(value).encode()
+    values = np.asarray(value)
+    return Decimals(values) if values.dtype.kind == "i" else words(values)
 
 
-class BinaryForm(TextForm):
-    """The binary form: one letter, then little-endian int32 and float64."""
+def _token(name: bytes, *numbers: Numbers) -> list[Piece]:
+    """A line: a letter with numbers, numbers alone, or a digit with numbers, with a blank between."""
+    parts: list[Piece] = [name] if name else []
+    for place, value in enumerate(numbers):
+        parts += [b" "] if place or name.isdigit() else []
+        parts.append(_number(value))
+    return [*parts, b"\n"]
 
-    letter, arithmetic = b"b", 1
-    padded = False
 
-    def number(self, value: Numbers) -> bytes | Hole:
-        """A number within a token, of four bytes if it is whole by its type."""
-        if isinstance(value, int):
-            return value.to_bytes(4, "little", signed=True)
-        values = np.asarray(value)
-        values = values.astype("<i4" if values.dtype.kind == "i" else "<f8")
-        return RawValues(values) if values.ndim else values.tobytes()
+def _constant(value: Floats | float) -> list[Piece]:
+    """A number in an expression."""
+    return _token(b"n", np.asarray(value, dtype=np.float64))
 
-    def token(self, name: bytes, *numbers: Numbers) -> list[Piece]:
-        """A letter or a digit, if any, and numbers."""
-        parts: list[Piece] = [name] if name else []
-        return parts + [self.number(value) for value in numbers]
+
+def _sum(count: int) -> list[Piece]:
+    """The operator for the sum of two summands or more."""
+    return _token(b"o", ADD) if count == 2 else [*_token(b"o", SUM), *_token(b"", count)]
 
 
 def generate(
-    form: CanonicalForm, _header: Sequence[str] = (), *, binary: bool = False, start: Floats | None = None
+    form: CanonicalForm, _header: Sequence[str] = (), *, start: Floats | None = None
 ) -> Iterator[bytes]:
     """The bytes of the .nl file, which holds no comments. start: a point (columns,) for the segment x."""
-    problem, nl, code = form.problem, form.nl_order, BinaryForm() if binary else TextForm()
+    problem, nl = form.problem, form.nl_order
     gradient = _gradient(nl)
-    yield _head(nl, code, len(gradient[0]))
+    yield _head(nl, len(gradient[0]))
     first = 0
     for family in nl.rows:
-        head = code.token(b"C", np.arange(first, first + family.count, dtype=np.int32))
-        yield from code.records([*head, *_NlExpressions(family, nl, code).monomials()], family.count)
+        head = _token(b"C", np.arange(first, first + family.count, dtype=np.int32))
+        yield from render([*head, *_NlExpressions(family, nl).monomials()], family.count)
         first += family.count
-    yield from _objective(nl, code)
+    yield from _objective(nl)
     if start is not None:
-        yield from code.records(code.token(b"x", problem.n_columns))
-        parts = code.token(b"", np.arange(problem.n_columns, dtype=np.int32), start[nl.order])
-        yield from code.records(parts, problem.n_columns)
-    yield from _limits(nl, code)
-    yield from _bounds(nl, code)
-    yield from _jacobian(nl, code, *gradient)
+        yield from render(_token(b"x", problem.n_columns))
+        parts = _token(b"", np.arange(problem.n_columns, dtype=np.int32), start[nl.order])
+        yield from render(parts, problem.n_columns)
+    yield from _limits(nl)
+    yield from _bounds(nl)
+    yield from _jacobian(nl, *gradient)
 
 
-def _head(nl: NlOrder, code: TextForm, costs: int) -> bytes:
+def _head(nl: NlOrder, costs: int) -> bytes:
     """The first ten lines. costs: entries of G."""
     problem, count = nl.problem, np.bincount(nl.group, minlength=9)
     nlvb, nlvc, only = int(count[:2].sum()), int(count[:4].sum()), int(count[4:6].sum())
@@ -140,12 +110,12 @@ def _head(nl: NlOrder, code: TextForm, costs: int) -> bytes:
     rows = (name_length(problem.instance, row.family.tag, row.family.over) for row in nl.rows)
     columns = (name_length(problem.instance, block.name, block.over) for block in problem.blocks.values())
     lines = [
-        b"%b4 1 1 0 %d" % (code.letter, stamp_option(problem.stamp)),
+        b"g4 1 1 0 %d" % stamp_option(problem.stamp),
         b" %d %d 1 0 %d" % (problem.n_columns, problem.n_rows, equations),
         b" %d %d" % (sum(family.count for family in nl.nonlinear_rows), bool(nl.nonlinear_objective)),
         b" 0 0",
         b" %d %d %d" % (nlvc, nlvc + only if only else nlvb, nlvb),
-        b" 0 0 %d 1" % code.arithmetic,
+        b" 0 0 0 1",
         b" %d %d %d %d %d" % tuple(int(count[group]) for group in (7, 8, 1, 3, 5)),
         b" %d %d" % (entries, costs),
         b" %d %d" % (max([len(OBJECTIVE), *rows]), max(columns)),
@@ -154,47 +124,46 @@ def _head(nl: NlOrder, code: TextForm, costs: int) -> bytes:
     return b"\n".join(lines) + b"\n"
 
 
-def _objective(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
+def _objective(nl: NlOrder) -> Iterator[bytes]:
     families = nl.nonlinear_objective
-    yield from code.records(code.token(b"O", 0, 0))
+    yield from render(_token(b"O", 0, 0))
     summands = sum(family.count for family in families)
     if not summands:
-        yield from code.records(code.constant(0.0))
+        yield from render(_constant(0.0))
     elif summands > 1:
-        yield from code.records(code.sum(summands))
+        yield from render(_sum(summands))
     for family in families:
-        yield from code.records(_NlExpressions(family, nl, code).expression(family.family.body), family.count)
+        yield from render(_NlExpressions(family, nl).expression(family.family.body), family.count)
 
 
 class _NlExpressions(PrefixLanguage):
     """Expressions of a family in a form of the file."""
 
-    def __init__(self, family: PlacedFamily, nl: NlOrder, code: TextForm) -> None:
+    def __init__(self, family: PlacedFamily, nl: NlOrder) -> None:
         super().__init__(family)
         self._nl = nl
-        self._code = code
 
     def number(self, values: Floats | float) -> Pieces:
         """A number."""
-        return self._code.constant(values)
+        return _constant(values)
 
     def column(self, symbol: Symbol) -> Pieces:
         """A column, by its place in the file."""
-        return self._code.token(b"v", self._nl.places(self.family, symbol))
+        return _token(b"v", self._nl.places(self.family, symbol))
 
     def node(self, operator: Operator, parts: list[Pieces]) -> Pieces:
         """An operator with its operands; a product is one of pairs, and a sum of two has its own operator."""
-        inside, code = [piece for part in parts for piece in part], self._code
+        inside = [piece for part in parts for piece in part]
         if operator == "sum":
-            return [*code.sum(len(parts)), *inside]
+            return [*_sum(len(parts)), *inside]
         if operator == "product":
             return [
-                *(piece for part in parts[:-1] for piece in (*code.token(b"o", MULTIPLY), *part)),
+                *(piece for part in parts[:-1] for piece in (*_token(b"o", MULTIPLY), *part)),
                 *parts[-1],
             ]
         if operator == "square":
-            return [*code.token(b"o", POWER), *inside, *code.constant(2.0)]
-        return [*code.token(b"o", NEGATE if operator == "negative" else COSINE), *inside]
+            return [*_token(b"o", POWER), *inside, *_constant(2.0)]
+        return [*_token(b"o", NEGATE if operator == "negative" else COSINE), *inside]
 
     def monomials(self) -> Pieces:
         """The nonlinear terms of a row; 0 without any."""
@@ -205,22 +174,22 @@ class _NlExpressions(PrefixLanguage):
         return self.join("sum", terms) if terms else self.number(0.0)
 
 
-def _limits(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
+def _limits(nl: NlOrder) -> Iterator[bytes]:
     if not nl.rows:
         return
-    yield from code.records(code.token(b"r"))
+    yield from render(_token(b"r"))
     for family in nl.rows:
         kind = {">=": b"2", "<=": b"1", "==": b"4"}[family.family.sense]
-        yield from code.records(code.token(kind, family.limit), family.count)
+        yield from render(_token(kind, family.limit), family.count)
 
 
 _BOUND: Final = np.array([{"lower": 2, "upper": 1, "free": 3}.get(kind, 0) for kind in BOUND_KINDS])
 """The digit before the bounds of a column, by their kind."""
 
 
-def _bounds(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
+def _bounds(nl: NlOrder) -> Iterator[bytes]:
     """Bounds in file order, one stretch of one block and of equal digits after the other."""
-    yield from code.records(code.token(b"b"))
+    yield from render(_token(b"b"))
     for block, run in nl.stretches:
         inside = nl.order[run] - block.offset
         digits = _BOUND[bound_kinds(block)[inside]]
@@ -228,7 +197,7 @@ def _bounds(nl: NlOrder, code: TextForm) -> Iterator[bytes]:
             lower, upper = block.lower[inside[part]], block.upper[inside[part]]
             digit = int(digits[part.start])
             ends = {0: (lower, upper), 1: (upper,), 2: (lower,), 3: ()}[digit]
-            yield from code.records(code.token(b"%d" % digit, *ends), len(lower))
+            yield from render(_token(b"%d" % digit, *ends), len(lower))
 
 
 def _entries(family: PlacedFamily) -> list[tuple[Symbol, Floats | float]]:
@@ -250,7 +219,7 @@ def _gradient(nl: NlOrder) -> tuple[Ints, Floats]:
     return place, costs[nl.order[place]]
 
 
-def _jacobian(nl: NlOrder, code: TextForm, place: Ints, costs: Floats) -> Iterator[bytes]:
+def _jacobian(nl: NlOrder, place: Ints, costs: Floats) -> Iterator[bytes]:
     problem = nl.problem
     rows = [(family, _entries(family)) for family in nl.rows]
     if rows:
@@ -259,17 +228,17 @@ def _jacobian(nl: NlOrder, code: TextForm, place: Ints, costs: Floats) -> Iterat
             for symbol, _ in entries:
                 block, inside = family.block(symbol), family.inside(symbol)
                 count[block.slice] += 1 if inside is None else np.bincount(inside, minlength=block.count)
-        yield from code.records(code.token(b"k", problem.n_columns - 1))
-        yield from code.records(
-            code.token(b"", np.cumsum(count[nl.order])[:-1].astype(np.int32)), problem.n_columns - 1
+        yield from render(_token(b"k", problem.n_columns - 1))
+        yield from render(
+            _token(b"", np.cumsum(count[nl.order])[:-1].astype(np.int32)), problem.n_columns - 1
         )
     first = 0
     for family, entries in rows:
-        parts = code.token(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries))
+        parts = _token(b"J", np.arange(first, first + family.count, dtype=np.int32), len(entries))
         for symbol, value in entries:
-            parts += code.token(b"", nl.places(family, symbol), np.asarray(value, dtype=np.float64))
-        yield from code.records(parts, family.count)
+            parts += _token(b"", nl.places(family, symbol), np.asarray(value, dtype=np.float64))
+        yield from render(parts, family.count)
         first += family.count
     if len(place):
-        yield from code.records(code.token(b"G", 0, len(place)))
-        yield from code.records(code.token(b"", place, costs), len(place))
+        yield from render(_token(b"G", 0, len(place)))
+        yield from render(_token(b"", place, costs), len(place))

@@ -45,7 +45,6 @@ from ..writing.records import (
     render,
     words,
 )
-from ..writing.terms import merged_terms
 
 _HEAD = """<?xml version="1.0" encoding="UTF-8"?>
 <osil xmlns="os.optimizationservices.org" xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" \
@@ -63,7 +62,7 @@ def generate(form: CanonicalForm, header: list[str]) -> Iterator[bytes]:
     problem, names = form.problem, form.names
     description = escape("\n".join(header))
     yield _HEAD.format(name=escape(problem.instance.name), description=description).encode()
-    yield f'<variables numberOfVariables="{form.column_count}">\n'.encode()
+    yield f'<variables numberOfVariables="{problem.n_columns + 1}">\n'.encode()
     for block in problem.blocks.values():
         yield from _variables(block, names, _LETTER[form.kind(block)])
     yield b'<var name="%b" type="C" lb="1" ub="1"/>\n</variables>\n' % form.one
@@ -95,27 +94,18 @@ def _variables(block: Block, names: Names, kind: str) -> Iterator[bytes]:
 
 def _coefficients(problem: Problem, degree: int) -> tuple[Ints, Floats]:
     """Columns (k, degree), each set once, and coefficients (k,) of the objective's terms up to quadratic."""
-    nonlinear = problem.objective_degree > 2
-    index, value = _quadratic_part(problem, degree) if nonlinear else problem.merged_objective(degree)
-    if degree:
-        check_coefficients(value, "the objective")
+    index, value = problem.merged_objective(degree, up_to=2)
+    check_coefficients(value, "the objective")
     return index, value
-
-
-def _quadratic_part(problem: Problem, degree: int) -> tuple[Ints, Floats]:
-    """As `_coefficients`, for an objective with terms beyond quadratic, which are left to the tree."""
-    at, values = [np.zeros((0, degree + 1), np.int64)], [np.zeros(0)]
-    for family in (family for family in problem.objective if family.degree <= 2):
-        for term in family.of_degree(degree):
-            at.append(np.stack([np.zeros(family.count, np.int32), *term.factors], axis=1).astype(np.int64))
-            values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
-    merged = merged_terms(np.concatenate(at), np.concatenate(values), indices=degree + 1, products=degree)
-    return merged.at[:, 1:], merged.value
 
 
 def _objective(problem: Problem) -> Iterator[bytes]:
     index, cost = _coefficients(problem, 1)
-    constant = float(_coefficients(problem, 0)[1].sum())
+    constant = float(problem.merged_objective(0)[1][0])
+    if problem.objective_degree > 2:  # that of the terms up to quadratic, summed in their order
+        held = (term for family in problem.objective if family.degree <= 2 for term in family.of_degree(0))
+        sums = [np.broadcast_to(term.coefficient, (term.family.count,)) for term in held]
+        constant = float(np.cumsum(np.concatenate([np.zeros(1), *sums]))[-1])
     yield b'<objectives numberOfObjectives="1">\n'
     size = f'numberOfObjCoef="{len(cost) + 1}"'
     yield f'<obj name="{OBJECTIVE.decode()}" maxOrMin="min" {size}>\n'.encode()

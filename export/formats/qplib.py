@@ -33,7 +33,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.formulations.families import PlacedFamily
+from ...models.formulations.families import PlacedFamily, row_sides
 from ...models.instance.domain import Floats, Ints
 from ..writing.canonical import CanonicalForm, coefficient
 from ..writing.curvature import probtype
@@ -51,8 +51,8 @@ def generate(form: CanonicalForm, header: list[str], *, start: Floats | None = N
         yield from _rows(form)
     yield _line(number_text(INFINITY), "infinity")
     if problem.rows:
-        yield from _vector(form.row_lower, "left side of a row")
-        yield from _vector(form.row_upper, "right side of a row")
+        for side, sides in zip(("left", "right"), row_sides(problem.rows), strict=True):
+            yield from _vector(sides, f"{side} side of a row")
     yield from _vector(problem.lower, "lower bound")
     yield from _vector(problem.upper, "upper bound")
     if problem.integer.any():

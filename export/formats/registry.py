@@ -31,17 +31,16 @@ class Format:
     """A file format: its capabilities and its writer.
 
     degree: greatest degree of a polynomial it holds (99: any function); module: of its writer in this folder;
-    dialects: named variants, the default first; has_start: whether it has a place for a starting point;
-    is_default: whether it is written when no format is requested; has_constant_column: whether the constant
-    of the objective is the cost of the column fixed to 1; command: a line that solves {model} and writes
-    {answer}; answers: suffix of that answer, so that those of several formats differ.
+    has_start: whether it has a place for a starting point; is_default: whether it is written when no format
+    is requested; has_constant_column: whether the constant of the objective is the cost of the column fixed
+    to 1; command: a line that solves {model} and writes {answer}; answers: suffix of that answer, so that
+    those of several formats differ.
     """
 
     name: str
     summary: str
     degree: int
     module: str
-    dialects: tuple[str, ...] = ("",)
     has_start: bool = False
     is_default: bool = True
     has_constant_column: bool = False
@@ -58,12 +57,10 @@ class Format:
         return _unpacked_name(Path(name)).endswith(self.suffix)
 
     def generate(
-        self, form: CanonicalForm, header: list[str], start: Floats | None = None, dialect: str = ""
+        self, form: CanonicalForm, header: list[str], start: Floats | None = None
     ) -> Iterator[bytes]:
         """The bytes of a file, as its writer makes them; the module of the writer is loaded only here."""
-        options: dict[str, Any] = {"start": start} if self.has_start else {}
-        if dialect == "binary":
-            options["binary"] = True
+        options = {"start": start} if self.has_start else {}
         writer = import_module(f"{__package__}.{self.module}")
         content: Iterator[bytes] = writer.generate(form, header, **options)
         return content
@@ -74,12 +71,11 @@ FORMATS: Final = {
     for entry in (
         Format(
             "nl", "AMPL .nl with .row and .col, for Ipopt, Bonmin, Couenne, SCIP, Baron, Knitro",
-            ANY_DEGREE, "nl", ("text", "binary"), has_start=True, command="bonmin {model} -AMPL",
+            ANY_DEGREE, "nl", has_start=True, command="bonmin {model} -AMPL",
         ),
         Format(
             "gms", "GAMS model, self-contained, one equation per row",
-            ANY_DEGREE, "gams", ("scalar",), has_start=True,
-            command="gams {model} --RESULTS={answer}", answers=".csv",
+            ANY_DEGREE, "gams", has_start=True, command="gams {model} --RESULTS={answer}", answers=".csv",
         ),
         Format(
             "lp", "CPLEX-style LP, for Gurobi, CPLEX, HiGHS, SCIP, Xpress, CBC, GLPK",
@@ -115,10 +111,9 @@ DEFAULTS: Final = tuple(name for name, entry in FORMATS.items() if entry.is_defa
 
 @dataclass(frozen=True)
 class Written:
-    """Result of a write: format, dialect, the problem as the file holds it; size and SHA-256 by file name."""
+    """Result of a write: format, the problem as the file holds it; size and SHA-256 by file name."""
 
     format: str
-    dialect: str
     problem: Problem
     files: dict[str, dict[str, Any]] = field(default_factory=dict)
 
@@ -184,7 +179,7 @@ def header_lines(problem: Problem) -> list[str]:
         name, integrality = f"continuous relaxation of {name}", "dropped"
     norms = f"stroke norm {options.stroke_norm}, beta norm {options.beta_norm}"
     lines = [
-        f"{program_version()}: {name}, {problem.problem_class}, {formulation.summary}",
+        f"{program_version()}: {name}, {problem.problem_class}, {formulation.declaration.summary}",
         f"instance {problem.instance.name}, gauge {problem.instance.gauge}, sha256 {problem.instance.sha256}",
         f"facet {options.facet}, {norms}, integrality {integrality}",
     ]
@@ -196,55 +191,17 @@ def write(
     problem: Problem,
     path: str | Path,
     *,
-    dialect: str | None = None,
     start: CrossField | None = None,
     force: bool = False,
 ) -> Written:
-    """Write a problem to a file. Equal problems give equal bytes.
-
-    A .nl comes with a .row and a .col file, and a .mod with its .dat; the files appear together.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    path
-        File to write. Its suffix names the format, and a further `.gz` compresses it.
-    dialect
-        `text` or `binary` for .nl.
-    start
-        A field whose point becomes the starting point. Only for formats that have a place for one: nl, gms,
-        qplib and bar.
-    force
-        Whether to replace files that crossfield has not written or that have changed since.
-
-    Returns
-    -------
-    Written
-        Format, dialect, the problem as the file holds it, and size and SHA-256 by file name.
-
-    Raises
-    ------
-    UnsupportedByFormatError
-        If the format cannot carry the problem, or has no place for the start.
-    InputError
-        For an unknown suffix or dialect, and for more pixels or faces than the memory holds.
-    OutputError
-        If a file cannot be written, or if another one is in the way.
-
-    """
+    """Write a problem to a file, as `write` of export/bundle/problem_files.py describes it."""
     path = Path(path)
     entry = format_of(path)
-    chosen = entry.dialects[0] if dialect is None else dialect
-    if chosen not in entry.dialects:
-        known = ", ".join(filter(None, entry.dialects))
-        remedy = f"choose one of {known}" if known else "it has one form, so leave the dialect out"
-        raise InputError(f"there is no dialect {chosen!r} of {entry.name}; {remedy}", file=path)
     if start is not None and not entry.has_start:
         holders = ", ".join(name for name, holder in FORMATS.items() if holder.has_start)
         raise UnsupportedByFormatError(
-            f"{entry.name} has no place for a start; choose a format that has one ({holders}), or call "
-            "write_problem, which writes a start file for each solver",
+            f"{entry.name} has no place for a start; choose a format that has one ({holders}), or give "
+            "formats=[...], which writes a start file for each solver",
             file=path,
         )
     domain = problem.instance.domain
@@ -253,9 +210,9 @@ def write(
     check_targets(path.parent, file_names(path.name, entry.name), force=force)
     form = CanonicalForm(held)
     point = None if start is None else held.point(start)
-    written = Written(entry.name, chosen, held)
+    written = Written(entry.name, held)
     lines = header_lines(held)
-    contents = [entry.generate(form, lines, point, chosen), *_companions(entry.name, form, lines)]
+    contents = [entry.generate(form, lines, point), *_companions(entry.name, form, lines)]
     files = zip(map(path.with_name, file_names(path.name, entry.name)), contents, strict=True)
     with ExitStack() as stack:  # the files get their names together, at its end
         for file, content in files:

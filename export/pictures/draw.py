@@ -1,17 +1,15 @@
-"""Pictures of instances, cross fields and surfaces as PNG, SVG or PDF: same input, same bytes.
+"""Pictures of instances, cross fields and surfaces as PNG or SVG: same input, same bytes.
 
 Most kinds are panels with words round them; `layers` is the bare field in the coordinates of its drawing.
 """
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -24,51 +22,39 @@ from ...models.storage import require_suffix, write_bytes
 from ...models.surface.surface import Surface
 from ...models.written_files import check_targets
 from . import panels
-from .canvas import draw_sheet, set_coordinates
 from .layers import field_sheet
-from .mesh_view import draw_mesh
-from .svg import sheet_svg
+from .marks import PAPER, Area, Layer, Mark, Sheet, TextMark
+from .mesh_view import AXES, draw_mesh
+from .svg import encode_png, load_font, render_sheet, sheet_svg
 from .underlay import Underlay, read_underlay
 
 _WORDS: Final = 7.5  # points of text
-DrawPanel = Callable[[Any, panels.PanelContent], None]
 
 
 @dataclass(frozen=True)
 class PictureKind:
-    """A kind of picture: description, panels with headings; no panels: the layers on the page of a drawing.
+    """A kind of picture: panels with headings; no panels: the layers on the page of a drawing.
 
     size: points of the longer side of a panel. columns: panels in a row. bar: points to the right for a
     colour bar. legend: keys below. words: points of text.
     """
 
-    description: str
-    panels: tuple[tuple[str, DrawPanel], ...]
+    panels: tuple[tuple[str, panels.DrawPanel], ...]
     size: float = 340.0
     columns: int = 1
     bar: float = 0.0
     legend: bool = False
     words: float = _WORDS
-    needs_field: bool = True
 
 
 LAYERS: Final = "layers"
 
 KINDS: Final = {
-    "instance": PictureKind(
-        "mask and strokes of an instance", (("", panels.draw_instance),), needs_field=False
-    ),
-    "crosses": PictureKind(
-        "crosses on the pixels, one in several on large grids", (("", panels.draw_crosses),), legend=True
-    ),
-    "field": PictureKind(
-        "evenly spaced streamlines of both line families, with singularities",
-        (("", panels.draw_streamlines),),
-        legend=True,
-    ),
-    "angle": PictureKind("map of the angle between the two lines", (("", panels.draw_angle),), bar=52.0),
+    "instance": PictureKind((("", panels.draw_instance),)),
+    "crosses": PictureKind((("", panels.draw_crosses),), legend=True),
+    "field": PictureKind((("", panels.draw_streamlines),), legend=True),
+    "angle": PictureKind((("angle between the lines", panels.draw_angle),), bar=32.0),
     "overview": PictureKind(
-        "instance, crosses, streamlines and angle map, with counts and energies",
         (
             ("instance", panels.draw_instance),
             ("crosses", panels.draw_crosses),
@@ -77,36 +63,29 @@ KINDS: Final = {
         ),
         size=165.0,
         columns=2,
-        bar=62.0,
+        bar=38.0,
         legend=True,
         words=10.0,
     ),
-    LAYERS: PictureKind("the field in the coordinates of its drawing, on top of it with --underlay", ()),
+    LAYERS: PictureKind(()),
 }
 """Kinds of pictures of instances and fields by name."""
 
-SHADED: Final = PictureKind("surface in the light of a lamp", (("", panels.draw_surface),))
+SHADED: Final = PictureKind((("", panels.draw_surface),))
 """The picture of a surface; `crossfield shade` writes others."""
 
 Subject = CrossField | Instance | Surface
 
-SUFFIXES: Final = {
-    ".png": {"Software": None},
-    ".svg": {"Date": None, "Creator": None},
-    ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-}
-"""File suffixes, and the metadata that would name a clock or a version."""
+SUFFIXES: Final = (".png", ".svg")
+"""File suffixes."""
 
-_DOTS: Final = 220  # dots per inch of a PNG
-_PREVIEW_DOTS: Final = 96
-_POINTS: Final = 72.0
+_DOTS: Final = 220 / 72  # dots per point of a PNG
+_PREVIEW_DOTS: Final = 96 / 72
+_LAYERS_SIDE: Final = 1222  # dots of the longer side of layers as PNG
 _EDGE: Final = 9.0
 _GAP: Final = 14.0
 _LINE: Final = 1.6  # height of a line of text, in its size
-_CHARACTER: Final = 0.55  # width of a character, at most, in its size
-_NARROWEST: Final = 52.0  # room for a heading
-_SEPARATOR: Final = "  ·  "
-_LONGEST: Final = 46  # characters of the longest part of a caption
+CROSSES_UP_TO: Final = 12  # pixels of the longer side of a grid that has crosses on a page, not streamlines
 _MESH_SIDE: Final = 400.0  # points of the side of a picture of a mesh
 ON_MESHES: Final = ("instance", "crosses")  # kinds of pictures of instances and fields on meshes
 
@@ -117,6 +96,7 @@ def draw(
     *,
     kind: str | None = None,
     underlay: str | Path | Underlay | None = None,
+    up: str | None = None,
     force: bool = False,
 ) -> Path:
     """Draw an instance, a field or a surface into a file.
@@ -126,13 +106,15 @@ def draw(
     subject
         An Instance, a CrossField or a Surface.
     path
-        The file to write; its suffix, .png, .svg or .pdf, decides the format.
+        The file to write; its suffix, .png or .svg, decides the format.
     kind
         A name in KINDS; an Instance has only `instance`, and a Surface one picture without a name. By default
         `layers` for a field as SVG or with an underlay, `crosses` on a mesh, and `field` otherwise.
     underlay
         The drawing (SVG, bitmap, .scap) or sample from which the instance was read. Its strokes become the
         bottom of `layers`; nothing else of the file is copied.
+    up
+        Axis of a mesh that points upwards: `x`, `y` or `z`, by default `z`.
     force
         Whether to replace a file that crossfield has not written or that has changed since. The underlay is
         never replaced.
@@ -156,6 +138,10 @@ def draw(
     require_suffix(path, *SUFFIXES)
     reads = [underlay] if isinstance(underlay, str | Path) else []
     check_targets(path.parent, [path.name], reads=reads, force=force)
+    if up is not None:
+        check_choice("axis", up, AXES)
+        if isinstance(subject, Surface) or not isinstance(_instance_of(subject).domain, Mesh):
+            raise DomainError("a picture of pixels has no axis upwards; leave up out")
     if isinstance(subject, Surface):
         if kind is not None or underlay is not None:
             raise InputError("a surface has one picture, on no drawing; leave kind and underlay out")
@@ -170,27 +156,22 @@ def draw(
             return path
         if underlay is not None:
             raise InputError(f"a picture of kind {kind} lies on no drawing; use kind {LAYERS}")
-    with fixed_settings({"font.size": chosen.words}):
-        return write_bytes(path, _save_figure(_draw_panels(subject, chosen), suffix), force=force)
+    sheet = _panels_sheet(subject, chosen, up or "z")
+    return write_bytes(path, sheet_svg(sheet) if suffix == ".svg" else _to_png(sheet, _DOTS), force=force)
 
 
 def preview(subject: CrossField | Instance | Surface) -> bytes:
-    """Draw a small picture for notebooks.
-
-    Parameters
-    ----------
-    subject
-        An instance, a field or a surface.
-
-    Returns
-    -------
-    bytes
-        A PNG.
-
-    """
+    """A small picture for notebooks, as PNG."""
     kind = SHADED if isinstance(subject, Surface) else KINDS[_default_kind(subject, ".png", underlaid=False)]
-    with fixed_settings():
-        return _save_figure(_draw_panels(subject, kind), ".png", dots=_PREVIEW_DOTS)
+    return _to_png(_panels_sheet(subject, kind), _PREVIEW_DOTS)
+
+
+def page_picture(field: CrossField) -> bytes:
+    """A picture for a page: PNG of a mesh, SVG of pixels, with streamlines where they are many."""
+    on_mesh = isinstance(field.instance.domain, Mesh)
+    few = on_mesh or max(field.instance.mask.shape) <= CROSSES_UP_TO
+    sheet = _panels_sheet(field, KINDS["crosses" if few else "field"])
+    return _to_png(sheet, _PREVIEW_DOTS) if on_mesh else sheet_svg(sheet)
 
 
 def _default_kind(subject: CrossField | Instance, suffix: str, *, underlaid: bool) -> str:
@@ -212,37 +193,25 @@ def draw_layers(
     """Draw a field in the coordinates of its drawing into files, whose layers are computed once."""
     if isinstance(underlay, str | Path):
         underlay = read_underlay(underlay, on=field.instance)
-    layers = field_sheet(field, underlay)
+    sheet = field_sheet(field, underlay)
+    paper = Layer("", (Area(PAPER, np.array([sheet.page]) + np.array([0, 0, *sheet.page[:2]])),))
     for path in paths:
-        suffix = path.suffix.lower()
-        if suffix == ".svg":
-            write_bytes(path, sheet_svg(layers), force=force)
+        if path.suffix.lower() == ".svg":
+            data = sheet_svg(sheet)
         else:
-            with fixed_settings():
-                write_bytes(path, _save_figure(draw_sheet(layers), suffix), force=force)
+            data = _to_png(replace(sheet, layers=(paper, *sheet.layers)), _LAYERS_SIDE / max(sheet.page[2:]))
+        write_bytes(path, data, force=force)
 
 
-@contextmanager
-def fixed_settings(more: dict[Any, Any] | None = None) -> Iterator[None]:
-    """Constant settings of matplotlib, whatever the user's are, and some more."""
-    import matplotlib as mpl
-
-    settings = {"svg.hashsalt": "crossfield", "pdf.fonttype": 42, "font.size": _WORDS, "path.simplify": False}
-    defaults = {key: value for key, value in mpl.rcParamsDefault.items() if not key.startswith("backend")}
-    with mpl.rc_context(defaults | settings | (more or {})):
-        yield
-
-
-def _save_figure(figure: Any, suffix: str, *, dots: int = _DOTS) -> bytes:
-    stream = io.BytesIO()
-    figure.savefig(stream, format=suffix[1:], dpi=dots, metadata=SUFFIXES[suffix])
-    return stream.getvalue()
+def _to_png(sheet: Sheet, dots: float) -> bytes:
+    """A sheet as PNG. dots: per unit of the page."""
+    return encode_png(render_sheet(sheet, *(max(1, round(dots * side)) for side in sheet.page[2:])))
 
 
 def _find_kind(kind: str, subject: Subject) -> PictureKind:
     """The kind of that name. Raises InputError for an unknown one, and for one that needs a field."""
     check_choice("kind of picture", kind, KINDS)
-    if KINDS[kind].needs_field and isinstance(subject, Instance):
+    if kind != "instance" and isinstance(subject, Instance):
         raise InputError(
             f"{subject.name} is an instance without a field, which kind {kind} needs; solve it first, "
             "or use kind instance"
@@ -259,82 +228,64 @@ def _instance_of(subject: Subject) -> Instance:
     return subject if isinstance(subject, Instance) else subject.instance
 
 
-def _draw_on_mesh(subject: CrossField | Instance) -> Any:
-    """The figure of a mesh with a caption below."""
-    from matplotlib.figure import Figure
+def _panels_sheet(subject: Subject, kind: PictureKind, up: str = "z") -> Sheet:
+    """Panels with headings, legend and caption below; every length in points. A mesh has one panel.
 
-    side, below = _MESH_SIDE / _POINTS, (2 * _EDGE + _LINE * _WORDS) / _POINTS
-    figure = Figure(figsize=(side, side + below), facecolor="white")
-    axes = figure.add_axes((0.0, below / (side + below), 1.0, side / (side + below)))
-    draw_mesh(axes, subject)
-    caption = _SEPARATOR.join(_caption_parts(subject, full=False))
-    figure.text(0.5, _EDGE / _POINTS / (side + below), caption, ha="center", color="#444444")
-    return figure
-
-
-def _draw_panels(subject: Subject, kind: PictureKind) -> Any:
-    """The figure: panels with headings, legend and caption below; every length in points."""
-    from matplotlib.figure import Figure
-
+    up: the axis of a mesh that points upwards.
+    """
     instance = _instance_of(subject)
-    if not isinstance(subject, Surface) and isinstance(instance.domain, Mesh):
-        return _draw_on_mesh(subject)
     field = subject if isinstance(subject, CrossField) else None
-    picture = panels.PanelContent(
-        instance, field, kind.size, subject if isinstance(subject, Surface) else None
-    )
-    size = np.array([picture.unit * side for side in picture.instance.mask.shape[::-1]])
-    line, character = _LINE * kind.words, _CHARACTER * kind.words
-    above = line * any(heading for heading, _ in kind.panels)
-    pitch = np.array([max(size[0], _NARROWEST), size[1] + above]) + _GAP
+    on_mesh = isinstance(instance.domain, Mesh)
+    shape = (1, 1) if on_mesh else instance.mask.shape
+    size = (_MESH_SIDE if on_mesh else kind.size) / max(shape) * np.array(shape[::-1])
+    line, above = _LINE * kind.words, _LINE * kind.words * any(heading for heading, _ in kind.panels)
+    pitch = size + np.array([_GAP, _GAP + above])
     grid = np.array([kind.columns, -(-len(kind.panels) // kind.columns)])
     inside = grid * pitch - _GAP + np.array([kind.bar, 0.0])
-    keys = panels.legend_keys(picture) if kind.legend else []
-    legend = character * sum(len(key.get_label()) + 6 for key in keys)
-    wide = max(inside[0], legend, character * _LONGEST)
-    caption = _wrap(_caption_parts(subject, full=len(kind.panels) > 1), int(wide / character))
-    below = _EDGE + line * (len(caption) + bool(keys))
-    page = np.array([wide + 2 * _EDGE, _EDGE + inside[1] + below])
-    figure = Figure(figsize=tuple(page / _POINTS), facecolor="white")
+    keys = panels.legend(field) if field and kind.legend and not on_mesh else []
+    font = load_font(kind.words)
+    lengths = [font.getlength(text) + _GAP for text, _ in keys]
+    caption = _caption_lines(subject, full=len(kind.panels) > 1)
+    wide = max(inside[0], sum(lengths), *map(font.getlength, caption))
+    page = (
+        0.0,
+        0.0,
+        float(wide + 2 * _EDGE),
+        float(2 * _EDGE + inside[1] + line * (bool(keys) + len(caption))),
+    )
+    marks: list[Mark] = [Area(PAPER, np.array([page]))]
     for number, (heading, panel) in enumerate(kind.panels):
         row, column = divmod(number, kind.columns)
-        left = (page[0] - inside[0]) / 2 + column * pitch[0] + (pitch[0] - _GAP - size[0]) / 2
-        corner = np.array([left, page[1] - _EDGE - row * pitch[1] - above - size[1]])
-        axes = figure.add_axes((*(corner / page), *(size / page)))
-        set_coordinates(axes, 0.0, 0.0, *size)
-        axes.set_title(heading, fontsize=kind.words, pad=4)
-        panel(axes, picture)
-    for number, words in enumerate(reversed(caption)):
-        figure.text(0.5, (_EDGE + number * line) / page[1], words, ha="center", va="bottom", color="#444444")
-    if keys:
-        place = (0.5, (_EDGE + line * len(caption) - 3) / page[1])
-        spaces = {"borderaxespad": 0, "borderpad": 0.2, "handlelength": 1.4, "columnspacing": 1.4}
-        style = {"bbox_to_anchor": place, "ncols": len(keys), "frameon": False}
-        figure.legend(handles=keys, loc="lower center", **style, **spaces)
-    return figure
+        x, y = (page[2] - inside[0]) / 2 + column * pitch[0], _EDGE + above + row * pitch[1]
+        if heading:
+            marks.append(TextMark(heading, (x + size[0] / 2, y - 0.4 * line), kind.words, "#000000"))
+        if not isinstance(subject, Surface) and on_mesh:
+            marks.append(draw_mesh(subject, _MESH_SIDE, up))
+            continue
+        surface = subject if isinstance(subject, Surface) else None
+        marks += panel(panels.PanelContent(instance, field, kind.size, surface, (x, y), kind.words))
+    x, y = (page[2] - sum(lengths) + _GAP) / 2, _EDGE + inside[1] + line
+    for (text, colour), length in zip(keys, lengths, strict=True):
+        marks.append(TextMark(text, (x, y), kind.words, colour, "start"))
+        x += length
+    y += line * bool(keys)
+    marks += [TextMark(text, (page[2] / 2, y + k * line), kind.words) for k, text in enumerate(caption)]
+    return Sheet(page, (Layer("", tuple(marks)),))
 
 
-def _wrap(parts: list[str], most: int) -> list[str]:
-    """Parts of a caption in lines of so many characters, or of one part."""
-    lines = parts[:1]
-    for part in parts[1:]:
-        longer = lines[-1] + _SEPARATOR + part
-        lines = [*lines[:-1], longer] if len(longer) <= most else [*lines, part]
-    return lines
-
-
-def _caption_parts(subject: Subject, *, full: bool) -> list[str]:
+def _caption_lines(subject: Subject, *, full: bool) -> list[str]:
     """Size and contents; if full, energies and gauge too."""
     instance = _instance_of(subject)
     domain, plural = instance.domain, "" if len(instance.theta) == 1 else "s"
     size = f"{domain.size} faces" if isinstance(domain, Mesh) else f"{domain.width} × {domain.height} pixels"
-    parts = [size, f"{len(instance.theta)} stroke {domain.kind}{plural}"]
+    gauge = f"  ·  gauge {instance.gauge}" if full else ""
+    lines = [f"{size}  ·  {len(instance.theta)} stroke {domain.kind}{plural}{gauge}"]
     if isinstance(subject, CrossField):
-        parts.append(count_singularities(subject))
+        lines.append(count_singularities(subject))
     if isinstance(subject, CrossField) and full:
         squared, absolute = (subject.energy(norm).total for norm in (2, 1))
-        parts.append(f"energy {squared:.4g} (2-norm), {absolute:.4g} (1-norm)")
-    return [*parts, f"gauge {instance.gauge}"] if full else parts
+        lines.append(f"energy {squared:.4g} (2-norm), {absolute:.4g} (1-norm)")
+    return lines
 
 
 def count_singularities(field: CrossField) -> str:

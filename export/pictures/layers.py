@@ -6,7 +6,6 @@ fields of 24 and of 96 pixels look alike. Streamlines are smooth curves, with fe
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -17,7 +16,7 @@ from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
 from ...models.sketch.curves import lines_as_cubics
 from ..shading.raster import border_width
-from .marks import FAMILIES, GridFrame, Layer, Lines, Sheet, split_runs
+from .marks import FAMILIES, GridFrame, ImageMark, Layer, Lines, Sheet, split_runs
 from .streamlines import streamlines
 from .underlay import INK, Underlay
 
@@ -38,74 +37,69 @@ _MOST_CROSSES: Final = 64  # along a side; of more, one in several
 
 def field_sheet(field: CrossField, drawing: Underlay | None = None) -> Sheet:
     """The layers of a field, over its drawing if given; crosses are hidden at first."""
-    place = SheetPlace(field.instance)
+    frame, unit = _frame_and_unit(field.instance)
     every = int(np.ceil(max(field.instance.mask.shape) / _MOST_CROSSES))
     layers = (
-        *(() if drawing is None else (_drawing_layer(drawing, place),)),
-        Layer("strokes", _stroke_lines(place), shown=drawing is None, opacity=0.45),
-        Layer("crosses", tuple(place.frame.crosses(field, _CROSS * place.unit, every)), shown=False),
-        *_streamline_layers(field, place),
-        Layer("singularities", tuple(place.frame.singularities(field, _DOT * place.unit))),
+        *(() if drawing is None else (_drawing_layer(drawing, unit),)),
+        Layer("strokes", _stroke_lines(frame, unit), shown=drawing is None, opacity=0.45),
+        Layer("crosses", tuple(frame.crosses(field, _CROSS * unit, every)), shown=False),
+        *_streamline_layers(field, frame, unit),
+        Layer("singularities", tuple(frame.singularities(field, _DOT * unit))),
     )
-    return Sheet(place.page if drawing is None else drawing.page, layers, drawing)
+    return (
+        Sheet(page_of(field.instance), layers)
+        if drawing is None
+        else Sheet(drawing.page, layers, drawing.size)
+    )
 
 
 def strokes_sheet(
     instance: Instance, page: Box, drawing: Underlay | None = None, width: float | None = None
 ) -> Sheet:
     """The strokes of the drawing, or of the instance, on a page. width: of lines in pixels of the grid."""
-    place = SheetPlace(instance)
+    frame, unit = _frame_and_unit(instance)
     if drawing is None:
-        layer = Layer("strokes", _stroke_lines(place))
+        layer = Layer("strokes", _stroke_lines(frame, unit))
     else:
-        layer = _drawing_layer(drawing, place, width and width * instance.pixel_size)
-    return Sheet(page, (layer,), drawing)
+        layer = _drawing_layer(drawing, unit, width and width * instance.pixel_size)
+    return Sheet(page, (layer,))
 
 
-@dataclass(frozen=True)
-class SheetPlace:
-    """Coordinates and lengths of an instance on its drawing."""
-
-    instance: Instance
-
-    @property
-    def unit(self) -> float:
-        """Length of a unit of the pictures."""
-        return float(self.instance.pixel_size * max(self.instance.mask.shape) / UNITS)
-
-    @property
-    def frame(self) -> GridFrame:
-        """The coordinates of the drawing."""
-        return GridFrame(self.instance, self.instance.origin, self.instance.pixel_size)
-
-    @property
-    def page(self) -> Box:
-        """The page without a drawing: from zero, or from a mask beyond zero, to the far sides of the mask."""
-        inside, size = np.argwhere(self.instance.mask)[:, ::-1], self.instance.pixel_size
-        low, high = (
-            np.array(self.instance.origin) + size * end
-            for end in (inside.min(axis=0), inside.max(axis=0) + 1)
-        )
-        if (low >= -size).all():
-            low = np.zeros(2)
-        (x, y), (width, height) = low.tolist(), (high - low).tolist()
-        return x, y, width, height
+def page_of(instance: Instance) -> Box:
+    """The page without a drawing: from zero, or from a mask beyond zero, to the far sides of the mask."""
+    inside, size = np.argwhere(instance.mask)[:, ::-1], instance.pixel_size
+    low, high = (
+        np.array(instance.origin) + size * end for end in (inside.min(axis=0), inside.max(axis=0) + 1)
+    )
+    if (low >= -size).all():
+        low = np.zeros(2)
+    (x, y), (width, height) = low.tolist(), (high - low).tolist()
+    return x, y, width, height
 
 
-def _drawing_layer(drawing: Underlay, place: SheetPlace, width: float | None = None) -> Layer:
-    """The curves of a drawing with a line width; without one, many over each other are drawn thinner."""
+def _frame_and_unit(instance: Instance) -> tuple[GridFrame, float]:
+    """The coordinates of the drawing, and the length of a unit of the pictures in them."""
+    frame = GridFrame(instance, instance.origin, instance.pixel_size)
+    return frame, float(instance.pixel_size * max(instance.mask.shape) / UNITS)
+
+
+def _drawing_layer(drawing: Underlay, unit: float, width: float | None = None) -> Layer:
+    """The ink of a drawing, or its curves with a line width; by default many over each other are thinner."""
+    if drawing.ink is not None:
+        high, wide = (drawing.scale * side for side in drawing.ink.shape[:2])
+        return Layer("drawing", (ImageMark((0.0, 0.0, wide, high), drawing.ink),))
     every = [piece for curves in drawing.curves.values() for piece in curves]
     length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
-    width = width or _BELOW * place.unit / np.sqrt(max(length / (_MUCH * UNITS * place.unit), 1.0))
+    width = width or _BELOW * unit / np.sqrt(max(length / (_MUCH * UNITS * unit), 1.0))
     lines = (Lines(INK[name], width, curves) for name, curves in drawing.curves.items() if curves)
     return Layer("drawing", tuple(lines))
 
 
-def _stroke_lines(place: SheetPlace) -> tuple[Lines, ...]:
-    return tuple(place.frame.strokes(INK["black"], _BELOW * place.unit))
+def _stroke_lines(frame: GridFrame, unit: float) -> tuple[Lines, ...]:
+    return tuple(frame.strokes(INK["black"], _BELOW * unit))
 
 
-def _streamline_layers(field: CrossField, place: SheetPlace) -> list[Layer]:
+def _streamline_layers(field: CrossField, frame: GridFrame, unit: float) -> list[Layer]:
     """Evenly spaced lines, a layer for each family; u is above."""
     from scipy import ndimage
 
@@ -122,7 +116,7 @@ def _streamline_layers(field: CrossField, place: SheetPlace) -> list[Layer]:
             for part in cut_at_border(run, depth)
         ]
         smooth = [fit_cubics(part, _TOLERANCE * scale) for part in inside if _length(part) >= _LEAST * scale]
-        lines = Lines(FAMILIES[family], _LINE * place.unit, list(map(place.frame.at, smooth)), single=True)
+        lines = Lines(FAMILIES[family], _LINE * unit, list(map(frame.at, smooth)), single=True)
         layers.append(Layer(name, (lines,)))
     return layers
 

@@ -1,12 +1,13 @@
-"""Marks of a picture (lines, dots, areas), and those of an instance and its field."""
+"""Marks of a picture (lines, dots, areas, images, words), and those of an instance and its field."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models.field.field import CrossField
 from ...models.instance.domain import Bools, Floats
@@ -14,7 +15,6 @@ from ...models.instance.instance import Instance
 from ...models.sketch.cover import Box
 from .palette import LIGHT
 from .streamlines import Streamline, align_labels, streamlines
-from .underlay import Underlay
 
 FAMILIES: Final = (LIGHT["u"], LIGHT["v"])
 POSITIVE, NEGATIVE, STROKE = LIGHT["plus"], LIGHT["minus"], LIGHT["stroke"]
@@ -59,7 +59,35 @@ class Area:
     opacity: float = 1.0
 
 
-Mark = Lines | Dots | Area
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Polygons (k, 2), the lowest first, each with the colours of its inside and its rim (or "none")."""
+
+    shapes: list[Floats]
+    colours: list[tuple[str, str]]
+    rim: float
+
+
+@dataclass(frozen=True, eq=False)
+class ImageMark:
+    """An image in a box x, y, width, height: red, green, blue and opacity, (h, w, 4)."""
+
+    box: Box
+    colours: NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class TextMark:
+    """A line of text, its place (x, y) on its base line, at its start or in its middle, and its height."""
+
+    text: str
+    place: tuple[float, float]
+    size: float
+    colour: str = "#444444"
+    anchor: Literal["start", "middle"] = "middle"
+
+
+Mark = Lines | Dots | Area | Polygons | ImageMark | TextMark
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +102,11 @@ class Layer:
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """Layers on a page (x, y, width, height), the lowest first; drawing: what lies below them, or None."""
+    """Layers on a page (x, y, width, height), the lowest first; size: width and height with their units."""
 
     page: Box
     layers: tuple[Layer, ...]
-    drawing: Underlay | None = None
+    size: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)

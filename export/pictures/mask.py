@@ -8,40 +8,17 @@ import numpy as np
 
 from ...models.errors import InputError
 from ...models.input_limits import MAX_PIXELS, MAX_SIDE
-from ...models.instance.domain import Bools, Floats
+from ...models.instance.domain import Bools
 from ...models.instance.instance import Instance
+from ...models.sketch.cover import Box
 from ...models.storage import replacing, require_suffix
-
-Page = tuple[float, float, float, float]
 
 
 def write_mask(instance: Instance, path: str | Path, *, force: bool = False) -> Path:
     """Write the mask of an instance as a PNG: white where the field is solved for, black elsewhere.
 
-    Parameters
-    ----------
-    instance
-        An instance that was read from a drawing.
-    path
-        File to write, with the suffix .png. It has the size of the bitmap or page that was read: what
-        `read_sketch` takes as `mask`.
-    force
-        Whether to replace a file that crossfield has not written or that has changed since, such as a painted
-        mask.
-
-    Returns
-    -------
-    Path
-        The path.
-
-    Raises
-    ------
-    InputError
-        For an instance from another source, or from a page that is too small or too large for a picture; and
-        for another suffix.
-    OutputError
-        If the file cannot be written, or if another one is in the way.
-
+    It has the size of the bitmap or page that was read. force: whether to replace a painted mask. Raises
+    InputError for an instance without such a page, and for another suffix; OutputError.
     """
     from PIL import Image
 
@@ -65,27 +42,18 @@ def has_mask(instance: Instance) -> bool:
     return _page(instance) is not None
 
 
-def mask_on_page(instance: Instance, page: Page) -> Bools:
+def mask_on_page(instance: Instance, page: Box) -> Bools:
     """Which pixels, of one unit a side, of the page have their middle in a pixel that is solved for."""
-    column, row = (_cells(*axis) for axis in zip(page[:2], page[2:], instance.origin, strict=True))
-    padded = np.pad(instance.mask, 1)
-    return padded[
-        np.ix_(
-            *(
-                np.clip(np.floor(cell / instance.pixel_size) + 1, 0, side - 1).astype(np.int64)
-                for cell, side in zip((row, column), padded.shape, strict=True)
-            )
-        )
-    ]
+    padded, chosen = np.pad(instance.mask, 1), []
+    axes = zip(page[:2], page[2:], instance.origin, padded.shape[::-1], strict=True)
+    for start, side, origin, cells in axes:
+        count = round(side)
+        middles = start + (np.arange(count) + 0.5) * side / count - origin
+        chosen.append(np.clip(np.floor(middles / instance.pixel_size) + 1, 0, cells - 1).astype(np.int64))
+    return padded[np.ix_(*chosen[::-1])]
 
 
-def _cells(start: float, side: float, origin: float) -> Floats:
-    """The distances of the middles of page pixels from the origin of the grid."""
-    count = round(side)
-    return start + (np.arange(count) + 0.5) * side / count - origin
-
-
-def _page(instance: Instance) -> Page | None:
+def _page(instance: Instance) -> Box | None:
     """The page of the drawing, if a mask of it has pixels and not too many."""
     page = None if instance.reading is None else instance.reading.page
     if page is None:

@@ -1,4 +1,4 @@
-"""A mesh with its strokes, crosses and singularities, seen from where most of them show, with matplotlib."""
+"""A mesh with its strokes, crosses and singularities, seen from where most of them show."""
 
 from __future__ import annotations
 
@@ -13,93 +13,87 @@ from ...models.field.triangles import vectors_of
 from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
-from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE
+from .marks import FAMILIES, NEGATIVE, PAPER, POSITIVE, STROKE, Polygons
 
 SHARP: Final = np.radians(30)  # angle between two faces from which their edge is drawn dark
-MOST_CROSSES: Final = 4000  # faces in view with a cross each; of more, one in several has one
+MOST_CROSSES: Final = 3000  # faces in view with a cross; of more, and of small ones, some stand for others
 MOST_TURNED: Final = 6000  # faces of a model that a page turns: more would exceed 200 kB
 _LIGHT: Final = np.array([0.35, 0.45, 0.82])  # towards the lamp, in the viewer's frame
 _PAPER: Final = 0.97  # brightness of a face towards the lamp
 _SHADE: Final = 0.30  # of which a face away from it loses this much
-_EDGE: Final = "#00000018"
+_RIM: Final = 0.25  # width of the edges of faces, in units of the picture
+_MARGIN: Final = 0.03  # of the side of the picture
 _DARK: Final = "#404040"
 _ARM: Final = 0.40  # half the length of a line of a cross, in roots of its share of the area
 _WIDTH: Final = 0.055  # of a line of a cross, in the same unit
 _DOT: Final = 0.016  # radius of a dot, in sides of the picture
 
 
-def find_view(mesh: Mesh, marked: Floats) -> Floats:
+AXES: Final = ("z", "x", "y")  # after so many turns of the axes, each is the third one
+
+
+def find_view(mesh: Mesh, marked: Floats, up: str = "z") -> Floats:
     """Unit vectors (3, 3) to the right, upwards and to the viewer, on one of 26 sides of a mesh.
 
-    From there most marked normals (k, 3) and most of the area show.
+    From there most marked normals (k, 3) and most of the area show. up: the axis that points upwards.
     """
+    turns = -AXES.index(up)
+    vertices, normals, marked = (np.roll(array, turns, 1) for array in (mesh.vertices, mesh.normals, marked))
     tilted = np.array([1.0, 0.8, 0.7])  # no face of a box is seen from its edge
     sides = [tilted * side for side in product((1, -1, 0.2), repeat=3) if side != (0.2, 0.2, 0.2)]
 
     def score(side: Floats) -> float:
         direction = side / np.linalg.norm(side)
-        front = np.clip(mesh.normals @ direction, 0, None)
+        front = np.clip(normals @ direction, 0, None)
         seen = (marked @ direction > 0.25).mean() if len(marked) else 0.0
         area = np.minimum(front, 0.6) @ mesh.areas / mesh.areas.sum()
         return round(float(0.5 * seen + area + 0.05 * direction[2]), 9)
 
-    z, is_flat = np.array([0.0, 0.0, 1.0]), np.ptp(mesh.vertices[:, 2]) == 0
+    z, is_flat = np.array([0.0, 0.0, 1.0]), np.ptp(vertices[:, 2]) == 0
     side = z if is_flat else max(sides, key=score)
     forward = side / np.linalg.norm(side)
     right = np.cross(np.array([0.0, 1.0, 0.0]) if is_flat else z, forward)
     right /= np.linalg.norm(right)
-    return np.stack([right, np.cross(forward, right), forward])
+    return np.roll(np.stack([right, np.cross(forward, right), forward]), -turns, axis=1)
 
 
-def draw_mesh(axes: Any, subject: CrossField | Instance) -> None:
-    """Draw a field or an instance on a mesh into axes of matplotlib: everything from far to near."""
-    from matplotlib.collections import PolyCollection
-    from matplotlib.colors import to_rgba
+def draw_mesh(subject: CrossField | Instance, side: float, up: str = "z") -> Polygons:
+    """A field or an instance on a mesh, from far to near, on a square page of that side.
 
+    up: the axis that points upwards.
+    """
     field = subject if isinstance(subject, CrossField) else None
     instance = subject if isinstance(subject, Instance) else subject.instance
     mesh = instance.mesh
     vertex, turns = np.zeros(0, dtype=np.int32), np.zeros(0)
     if field is not None:
         vertex, turns = field.singularities.vertex, field.singularities.index
-    to_viewer = find_view(mesh, _vertex_normals(mesh)[vertex]).T
+    to_viewer = find_view(mesh, _vertex_normals(mesh)[vertex], up).T
     points, towards = mesh.vertices @ to_viewer, mesh.normals @ to_viewer
     low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
-    side, corners = float((high - low).max()), points[mesh.faces]
+    reach, corners = float((high - low).max()), points[mesh.faces]
     shown = np.ones(mesh.size, dtype=bool) if len(mesh.boundary) else towards[:, 2] > 0
-    shapes = list(corners[shown][:, :, :2])
-    colours, depth = [_shades(towards[shown])], [corners[shown][:, :, 2].mean(axis=1)]
-    edges = [np.tile(to_rgba(_EDGE), (len(shapes), 1))]
+    shapes = [*corners[shown][:, :, :2]]
+    colours, depth = _shades(towards[shown]), [corners[shown][:, :, 2].mean(axis=1)]
 
     def add(polygons: Floats, depths: Floats, colour: str) -> None:
         shapes.extend(polygons)
         depth.append(depths)
-        colours.append(np.tile(to_rgba(colour), (len(polygons), 1)))
-        edges.append(np.zeros((len(polygons), 4)))
+        colours.extend([(colour, "none")] * len(polygons))
 
     for ends, colour, width, above in _line_marks(mesh, field, instance, shown):
         flat = ends @ to_viewer
-        add(_strips(flat[:, :, :2], width), flat[:, :, 2].mean(axis=1) + above * side, colour)
-    radius = _DOT * side * np.where(np.abs(turns) < 0.5, 1.0, 1.4)
+        add(_strips(flat[:, :, :2], width), flat[:, :, 2].mean(axis=1) + above * reach, colour)
+    radius = _DOT * reach * np.where(np.abs(turns) < 0.5, 1.0, 1.4)
     for colour, some in ((POSITIVE, turns > 0), (NEGATIVE, turns < 0)):
-        place, height = points[vertex[some], :2], points[vertex[some], 2] + 2 * _DOT * side
-        for paint, part, above in ((PAPER, 1.25, 0.0), (colour, 1.0, 1e-6 * side)):
+        place, height = points[vertex[some], :2], points[vertex[some], 2] + 2 * _DOT * reach
+        for paint, part, above in ((PAPER, 1.25, 0.0), (colour, 1.0, 1e-6 * reach)):
             circle = part * radius[some, None, None] * _CIRCLE
             add(place[:, None] + circle, height + above, paint)
-    nearest = np.argsort(np.concatenate(depth), kind="stable")
-    axes.add_collection(
-        PolyCollection(
-            [shapes[number] for number in nearest],
-            facecolors=np.concatenate(colours)[nearest],
-            edgecolors=np.concatenate(edges)[nearest],
-            linewidths=0.25,
-        )
-    )
-    margin = 0.03 * side
-    axes.set_xlim(low[0] - margin, high[0] + margin)
-    axes.set_ylim(low[1] - margin, high[1] + margin)
-    axes.set_aspect("equal")
-    axes.set_axis_off()
+    nearest = np.argsort(np.concatenate(depth), kind="stable").tolist()
+    scale, middle = (1 - 2 * _MARGIN) * side / reach, (low + high) / 2
+    placed = [side / 2 + scale * (shapes[number] - middle) * (1, -1) for number in nearest]
+    return Polygons(placed, [colours[number] for number in nearest], _RIM)
 
 
 _CIRCLE: Final = np.stack([np.cos(np.arange(24) * np.pi / 12), np.sin(np.arange(24) * np.pi / 12)], axis=1)
@@ -113,16 +107,17 @@ def _line_marks(
     typical = float(np.median(size))
     marks = [(mesh.vertices[_dark_edges(mesh)], _DARK, 0.6 * _WIDTH * typical, 2e-3)]
     if field is not None:
-        every = max(-(-int(shown.sum()) // MOST_CROSSES), 1)
-        faces = np.nonzero(shown)[0][::every].astype(np.int32)
-        arm, width = np.sqrt(every), _WIDTH * typical * np.sqrt(every)
+        inside = np.nonzero(shown)[0].astype(np.int32)
+        share = mesh.areas[inside].sum() / MOST_CROSSES  # of the area, which has one cross at most
+        faces = inside[np.diff(np.cumsum(mesh.areas[inside]) // share, prepend=-1) > 0]
+        size, width = np.maximum(size, np.sqrt(share)), _WIDTH * max(typical, np.sqrt(share))
         lines = list(zip(vectors_of(field)[faces].swapaxes(0, 1), _colours_of_lines(instance), strict=True))
     else:
         seen = shown[instance.stroke_index]
-        faces, arm, width = instance.stroke_index[seen], 1.0, 1.5 * _WIDTH * typical
+        faces, width = instance.stroke_index[seen], 1.5 * _WIDTH * typical
         lines = [(mesh.vectors(faces, instance.theta[seen]), STROKE)]
     for vectors, colour in lines:
-        reach = _ARM * size[faces, None] * arm * vectors
+        reach = _ARM * size[faces, None] * vectors
         ends = np.stack([mesh.centres[faces] - reach, mesh.centres[faces] + reach], axis=1)
         marks.append((ends, colour, width, 1e-3))
     return marks
@@ -148,11 +143,11 @@ def _vertex_normals(mesh: Mesh) -> Floats:
     return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])
 
 
-def _shades(normals: Floats) -> Floats:
-    """Grey (k, 4) of faces with normals in the viewer's frame; back sides are lit from behind."""
+def _shades(normals: Floats) -> list[tuple[str, str]]:
+    """Greys of faces with normals in the viewer's frame and of their edges; back sides are lit, too."""
     light = np.abs(normals @ (_LIGHT / np.linalg.norm(_LIGHT)))
-    grey = _PAPER - _SHADE * (1 - light)
-    return np.stack([grey, grey, grey, np.ones_like(grey)], axis=1)
+    grey = 255 * (_PAPER - _SHADE * (1 - light))
+    return [("#" + 3 * f"{inside:02x}", "#" + 3 * f"{int(0.91 * inside):02x}") for inside in grey.astype(int)]
 
 
 def _strips(segments: Floats, width: float) -> Floats:

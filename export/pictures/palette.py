@@ -24,7 +24,5 @@ DARK: Final = {
 }
 """Colours of the same parts on dark pages."""
 
-ANGLE_MAP: Final = "magma"
-"""The colours of angles between the lines, 0 to 90 degrees: a map of matplotlib."""
 ANGLES: Final = ("#000004", "#51127c", "#b73779", "#fc8961", "#fcfdbf")
-"""That map at 0, 22.5, ..., 90 degrees, for pages."""
+"""Colours of angles between the lines of 0, 22.5, ..., 90 degrees: the map magma."""

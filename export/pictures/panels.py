@@ -1,47 +1,52 @@
-"""The panels of a picture: each function draws one kind onto matplotlib axes in points, y down."""
+"""The panels of a picture: each function returns the marks of one kind, in points, y down."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...models.field.field import CrossField
 from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.surface.surface import Surface
-from ..shading.colours import shade_by_light
+from ..shading.colours import shade_by_light, to_eight_bit
 from ..shading.raster import raster, view_of_grid
-from .canvas import draw_smooth_image, paint
-from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, GridFrame
-from .palette import ANGLE_MAP
+from .marks import BORDER, FAINT, FAMILIES, NEGATIVE, POSITIVE, STROKE, GridFrame, ImageMark, Mark, TextMark
+from .palette import ANGLES
 
 COLLAPSED: Final = "#b9a3d6"
 OUTSIDE: Final = "#ececec"
 
 _DOTS_PER_POINT: Final = 3  # of a surface, as in a PNG
+_SHARP: Final = 800  # dots of the longer side of an image whose pixels are seen
+_BAR: Final = 9.0  # points: width of a colour bar, and its distance from the panel
 SPACING: Final = 6.5  # points between streamlines of one family in a panel of full size
 
 
 @dataclass(frozen=True, eq=False)
 class PanelContent:
-    """Contents and size of a panel, in points of the longer side of the grid."""
+    """Contents of a panel, points of the longer side of its grid, its upper left corner, size of words."""
 
     instance: Instance
     field: CrossField | None
     size: float
     surface: Surface | None = None
+    corner: tuple[float, float] = (0.0, 0.0)
+    words: float = 7.5
 
     @property
     def frame(self) -> GridFrame:
-        """The coordinates of the axes."""
-        return GridFrame(self.instance, (0.0, 0.0), self.unit)
+        """The coordinates of the picture."""
+        return GridFrame(self.instance, self.corner, self.unit)
 
     @property
-    def extent(self) -> tuple[float, float, float, float]:
-        """Left, right, bottom and top of an image over the grid."""
-        return 0.0, self.unit * self.instance.grid.width, self.unit * self.instance.grid.height, 0.0
+    def box(self) -> tuple[float, float, float, float]:
+        """Left, top, width and height of the grid."""
+        return *self.corner, self.unit * self.instance.grid.width, self.unit * self.instance.grid.height
 
     @property
     def unit(self) -> float:
@@ -60,98 +65,89 @@ class PanelContent:
         return self.field
 
 
-def draw_instance(axes: Any, picture: PanelContent) -> None:
+def draw_instance(picture: PanelContent) -> list[Mark]:
     """Mask and strokes."""
     frame = picture.frame
-    paint(axes, [frame.area(OUTSIDE, ~picture.instance.mask)])
-    paint(axes, frame.strokes(STROKE, max(1.1 * picture.ink, min(0.22 * picture.unit, 2.6))))
-    _draw_border(axes, picture)
+    strokes = frame.strokes(STROKE, max(1.1 * picture.ink, min(0.22 * picture.unit, 2.6)))
+    return [frame.area(OUTSIDE, ~picture.instance.mask), *strokes, _border(picture)]
 
 
-def draw_crosses(axes: Any, picture: PanelContent) -> None:
+def draw_crosses(picture: PanelContent) -> list[Mark]:
     """Crosses on the pixels, at least some points apart."""
-    _draw_background(axes, picture)
     every = int(np.ceil(7.5 * picture.ink / picture.unit))
-    paint(axes, picture.frame.crosses(picture.crosses, 0.9 * picture.ink, every))
-    _draw_singularities(axes, picture)
+    crosses = picture.frame.crosses(picture.crosses, 0.9 * picture.ink, every)
+    return [*_background(picture), *crosses, *_singularities(picture)]
 
 
-def draw_streamlines(axes: Any, picture: PanelContent) -> None:
+def draw_streamlines(picture: PanelContent) -> list[Mark]:
     """Evenly spaced streamlines of both families, singularities and degenerate pixels."""
-    field = picture.crosses
-    _draw_background(axes, picture)
-    paint(axes, [picture.frame.area(COLLAPSED, field.image(field.degenerate) > 0)])
-    paint(axes, picture.frame.streamlines(field, 0.85 * picture.ink, SPACING * picture.ink))
-    _draw_singularities(axes, picture)
+    field, frame = picture.crosses, picture.frame
+    collapsed = frame.area(COLLAPSED, field.image(field.degenerate, 0.0) > 0)
+    lines = frame.streamlines(field, 0.85 * picture.ink, SPACING * picture.ink)
+    return [collapsed, *_background(picture), *lines, *_singularities(picture)]
 
 
-def draw_angle(axes: Any, picture: PanelContent) -> None:
-    """The angle between the two lines in degrees."""
+def draw_angle(picture: PanelContent) -> list[Mark]:
+    """The angle between the two lines in degrees, with a colour bar to the right of the panel."""
     field = picture.crosses
     degrees = field.image(np.degrees(field.angle_between))
-    image = _draw_image(axes, picture, degrees, vmin=0.0, vmax=90.0, cmap=ANGLE_MAP)
-    _draw_border(axes, picture)
-    _draw_singularities(axes, picture)
-    _draw_colour_bar(axes, image, picture, "angle between the lines", ticks=[0, 30, 60, 90], format="%d°")
-
-
-def legend_keys(picture: PanelContent) -> list[Any]:
-    """Keys of the marks in a picture of a field."""
-    from matplotlib.lines import Line2D
-
-    field = picture.crosses
-    index = field.singularities.index
-    keys = [
-        Line2D([], [], color=colour, lw=1.4, label=f"lines {name}")
-        for colour, name in zip(FAMILIES, "uv", strict=True)
+    fine = -(-_SHARP // max(degrees.shape))
+    image = ImageMark(picture.box, np.kron(_angle_colours(degrees), np.ones((fine, fine, 1), dtype=np.uint8)))
+    x, y, width, height = picture.box
+    x += width + _BAR
+    bar = ImageMark((x, y, _BAR, height), _angle_colours(np.linspace(90.0, 0.0, 91)[:, None]))
+    ticks = (0, 30, 60, 90) if height > 8 * picture.words else (0, 90)
+    words = [
+        TextMark(
+            f"{tick}°",
+            (x + 1.5 * _BAR, y + height * (1 - tick / 90) + 0.35 * picture.words),
+            picture.words,
+            anchor="start",
+        )
+        for tick in ticks
     ]
+    return [image, bar, *words, _border(picture), *_singularities(picture)]
+
+
+def _angle_colours(degrees: Floats) -> NDArray[np.uint8]:
+    """Colours (h, w, 4) of angles, transparent where they are not numbers."""
+    stops = np.array([[*bytes.fromhex(colour[1:])] for colour in ANGLES])
+    colours = [np.interp(degrees, np.linspace(0, 90, len(ANGLES)), stops[:, channel]) for channel in range(3)]
+    opacity = np.where(np.isnan(degrees), 0, 255)
+    table: NDArray[np.uint8] = np.nan_to_num(np.stack([*colours, opacity], axis=-1)).round().astype(np.uint8)
+    return table
+
+
+def draw_surface(picture: PanelContent) -> list[Mark]:
+    """The surface in the light of a lamp, smooth at any size."""
+    assert picture.surface is not None
+    view = view_of_grid(picture.instance, max(1, round(_DOTS_PER_POINT * picture.unit)))
+    image = shade_by_light(raster(picture.instance, picture.surface.normals, view))
+    return [ImageMark(picture.box, to_eight_bit(image))]
+
+
+DrawPanel = Callable[[PanelContent], list[Mark]]
+
+
+def legend(field: CrossField) -> list[tuple[str, str]]:
+    """Words on the marks in a picture of a field, and their colours."""
+    index = field.singularities.index
+    keys = [(f"lines {name}", colour) for name, colour in zip("uv", FAMILIES, strict=True)]
     for colour, name, some in ((POSITIVE, "+", index > 0), (NEGATIVE, "−", index < 0)):
         if some.any():
             sizes = "1/4" if (np.abs(index[some]) < 0.5).all() else "1/4, large: 1/2"
-            keys.append(
-                Line2D([], [], ls="", marker="o", ms=5, mew=0, color=colour, label=f"index {name}{sizes}")
-            )
-    if field.degenerate.any():
-        keys.append(Line2D([], [], ls="", marker="s", ms=5, mew=0, color=COLLAPSED, label="lines coincide"))
-    return keys
+            keys.append((f"index {name}{sizes}", colour))
+    return [*keys, ("lines coincide", COLLAPSED)] if field.degenerate.any() else keys
 
 
-def _draw_background(axes: Any, picture: PanelContent) -> None:
+def _background(picture: PanelContent) -> list[Mark]:
     """The strokes, faintly, and the border."""
-    paint(axes, picture.frame.strokes(FAINT, 2.6 * picture.ink, 0.8))
-    _draw_border(axes, picture)
+    return [*picture.frame.strokes(FAINT, 2.6 * picture.ink, 0.8), _border(picture)]
 
 
-def _draw_border(axes: Any, picture: PanelContent) -> None:
-    paint(axes, [picture.frame.sides(BORDER, 0.5 * picture.ink)], snap=True)
+def _border(picture: PanelContent) -> Mark:
+    return picture.frame.sides(BORDER, 0.5 * picture.ink)
 
 
-def _draw_singularities(axes: Any, picture: PanelContent) -> None:
-    paint(axes, picture.frame.singularities(picture.crosses, 2.75 * picture.ink))
-
-
-def _draw_image(axes: Any, picture: PanelContent, values: Floats, **style: Any) -> Any:
-    return axes.imshow(
-        values, extent=picture.extent, origin="upper", interpolation="nearest", aspect="auto", **style
-    )
-
-
-def _draw_colour_bar(axes: Any, image: Any, picture: PanelContent, label: str, **style: Any) -> None:
-    """A colour bar to the right of the axes, in room that the page has left there."""
-    inset = axes.inset_axes([1 + 9 / picture.size, 0.0, 8 / picture.size, 1.0])
-    bar = axes.figure.colorbar(image, cax=inset, **style)
-    bar.outline.set_visible(False)
-    if picture.unit * picture.instance.grid.height > 100:
-        bar.set_label(label)
-    else:
-        bar.set_ticks([bar.vmin, bar.vmax])
-    inset.tick_params(length=2, width=0.5)
-
-
-def draw_surface(axes: Any, picture: PanelContent) -> None:
-    """The surface in the light of a lamp, smooth at any size."""
-    assert picture.surface is not None
-    scale = max(1, round(_DOTS_PER_POINT * picture.unit))
-    view = view_of_grid(picture.instance, scale)
-    image = shade_by_light(raster(picture.instance, picture.surface.normals, view))
-    draw_smooth_image(axes, image, picture.extent)
+def _singularities(picture: PanelContent) -> list[Mark]:
+    return [*picture.frame.singularities(picture.crosses, 2.75 * picture.ink)]

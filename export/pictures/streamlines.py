@@ -17,7 +17,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.errors import InputError
 from ...models.field.field import CrossField
 from ...models.field.jumps import step_labels
 from ...models.instance.angles import double_angle
@@ -30,7 +29,6 @@ _Array = np.ndarray[Any, Any]
 CLOSEST: Final = 0.55  # lines of one family end where they come closer than this part of the separation
 
 _LONGEST: Final = 0.45  # step in pixels; below 1/2, so that it never leaves the cells that touch its pixel
-_DENSEST: Final = 400  # separations across the grid, at most
 _SHORTEST: Final = 1.2  # lines shorter than this many separations are not worth their ink
 _FINENESS: Final = 6  # raster cells per separation, at least
 _CORNERS: Final = np.array([[0, 0, 1, 1], [0, 1, 0, 1]])[..., None]  # of four pixels: below, to the right
@@ -54,12 +52,8 @@ class Streamline:
 def streamlines(field: CrossField, separation: float) -> list[Streamline]:
     """Lines of both families that cover the mask, about `separation` pixels apart within a family.
 
-    The result does not depend on the labels of the crosses. Raises InputError when the separation is not a
-    number of at least 1/400 of the grid's longer side.
+    The result does not depend on the labels of the crosses.
     """
-    least = max(field.instance.mask.shape) / _DENSEST
-    if not (np.isfinite(separation) and separation >= least):
-        raise InputError(f"the separation is {separation} pixels; it must be a number of at least {least:g}")
     crosses = _Crosses(align_labels(field))
     cover = _Cover(crosses, separation)
     lines: list[Streamline] = []

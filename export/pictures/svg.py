@@ -1,6 +1,6 @@
-"""The writer of SVG files: sheets of marks, the same bytes for the same input.
+"""Sheets of marks as SVG files, whose layers Inkscape shows as layers, and as bitmaps.
 
-Layers are groups that Inkscape shows as layers. Pictures for a browser follow the reader's dark mode.
+The same input gives the same bytes.
 """
 
 from __future__ import annotations
@@ -8,18 +8,21 @@ from __future__ import annotations
 import base64
 import io
 from collections.abc import Iterator
-from typing import Final
+from typing import TYPE_CHECKING, Final, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...models.instance.domain import Floats
-from .marks import Area, Dots, Layer, Lines, Mark, Sheet
-from .underlay import Underlay, ink_colours, size_in_units
+from .marks import Area, Dots, ImageMark, Lines, Mark, Polygons, Sheet, TextMark, straight_line
+from .underlay import size_in_units
+
+if TYPE_CHECKING:
+    from PIL import ImageFont
 
 _FINENESS: Final = 20_000.0  # steps of coordinates along the longer side of the page, at least
-_COARSE: Final = 3_000.0  # the same for a browser
 _PARTS: Final = 16.0  # the same for each pixel of a picture
+_PLAIN: Final = str.maketrans("×−", "x-")  # signs that the font of bitmaps lacks
 _SPACES: Final = (
     'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
     'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape"'
@@ -28,35 +31,44 @@ _SPACES: Final = (
 
 def sheet_svg(sheet: Sheet) -> bytes:
     """The file of a sheet, its layers as layers of a drawing program."""
-    size = size_in_units(sheet.page) if sheet.drawing is None else sheet.drawing.size
-    return _svg_document(_SPACES, sheet, size, [*_svg_body(sheet, _FINENESS)])
-
-
-def web_sheet_svg(sheet: Sheet, dark: dict[str, str]) -> bytes:
-    """The file of a sheet for a browser. dark: colours of dark mode by those that they replace."""
-    body = list(_svg_body(sheet, _COARSE))
-    text = "".join(body)
-    rules = "".join(
-        f'[{attribute}="{light}"]{{{attribute}:{night}}}'
-        for light, night in dark.items()
-        for attribute in ("fill", "stroke")
-        if f'{attribute}="{light}"' in text
-    )
-    style = f"<style>@media (prefers-color-scheme:dark){{{rules}}}</style>"
     return _svg_document(
-        'xmlns="http://www.w3.org/2000/svg"', sheet, size_in_units(sheet.page), [style, *body]
+        _SPACES, sheet, sheet.size or size_in_units(sheet.page), [*_svg_body(sheet, _FINENESS)]
     )
 
 
 def render_sheet(sheet: Sheet, width: int, height: int) -> NDArray[np.uint8]:
     """Red, green, blue and opacity (height, width, 4) of the layers on a page without paper."""
     import resvg_py
-    from PIL import Image
+    from PIL import Image, ImageDraw
 
     body = [*_svg_body(sheet, _PARTS * max(width, height))]
     text = _svg_document(f'{_SPACES} preserveAspectRatio="none"', sheet, (str(width), str(height)), body)
-    picture = resvg_py.svg_to_bytes(svg_string=text.decode(), skip_system_fonts=True)
-    return np.asarray(Image.open(io.BytesIO(bytes(picture))).convert("RGBA"))
+    data = resvg_py.svg_to_bytes(svg_string=text.decode(), skip_system_fonts=True)
+    image = Image.open(io.BytesIO(bytes(data))).convert("RGBA")
+    pen, scale = ImageDraw.Draw(image), width / sheet.page[2]
+    for words in (mark for layer in sheet.layers for mark in layer.parts if isinstance(mark, TextMark)):
+        (left, top, *_), (x, y) = sheet.page, words.place
+        font, anchor = load_font(scale * words.size), f"{words.anchor[0].replace('s', 'l')}s"
+        pen.text(
+            (scale * (x - left), scale * (y - top)), words.text.translate(_PLAIN), words.colour, font, anchor
+        )
+    return np.asarray(image)
+
+
+def load_font(size: float) -> ImageFont.FreeTypeFont:
+    """The font of words in bitmaps, which Pillow contains: the same on every machine."""
+    from PIL import ImageFont
+
+    return cast("ImageFont.FreeTypeFont", ImageFont.load_default(size))
+
+
+def encode_png(picture: NDArray[np.uint8]) -> bytes:
+    """A picture (h, w, 3 or 4) of red, green, blue and optional opacity as PNG."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, "PNG")
+    return stream.getvalue()
 
 
 def _svg_document(spaces: str, sheet: Sheet, size: tuple[str, str], body: list[str]) -> bytes:
@@ -68,42 +80,49 @@ def _svg_document(spaces: str, sheet: Sheet, size: tuple[str, str], body: list[s
 def _svg_body(sheet: Sheet, fineness: float) -> Iterator[str]:
     step = 10.0 ** -np.ceil(np.log10(fineness / max(sheet.page[2:])))
     for layer in sheet.layers:
-        parts = [line for part in layer.parts for line in _mark_elements(part, step)]
+        parts = (line for part in layer.parts for line in _mark_elements(part, step))
         if layer.name:
-            yield from _layer_group(layer, sheet.drawing if layer.name == "drawing" else None, parts)
-        else:
-            yield from parts
-
-
-def _layer_group(layer: Layer, drawing: Underlay | None, parts: list[str]) -> Iterator[str]:
-    yield (
-        f'<g id="{layer.name}" inkscape:groupmode="layer" inkscape:label="{layer.name}" '
-        f'style="display:{"inline" if layer.shown else "none"}"{_opacity_attribute(layer.opacity)}>'
-    )
-    if drawing is not None and drawing.ink is not None:
-        yield _ink_image(drawing.ink, drawing.scale)
-    yield from parts
-    yield "</g>"
+            style = (
+                f'style="display:{"inline" if layer.shown else "none"}"{_opacity_attribute(layer.opacity)}'
+            )
+            yield f'<g id="{layer.name}" inkscape:groupmode="layer" inkscape:label="{layer.name}" {style}>'
+        yield from parts
+        if layer.name:
+            yield "</g>"
 
 
 def _mark_elements(part: Mark, step: float) -> Iterator[str]:
-    if isinstance(part, Lines):
-        return _line_elements(part, step)
-    if isinstance(part, Dots):
-        return _dot_elements(part, step)
-    return _area_element(part, step)
+    match part:
+        case Lines():
+            yield from _line_elements(part, step)
+        case Dots():
+            yield from _dot_elements(part, step)
+        case Area():
+            yield from _area_element(part, step)
+        case Polygons():
+            yield f'<g stroke-width="{part.rim:.4g}" stroke-linejoin="round">'
+            for shape, (inside, rim) in zip(part.shapes, part.colours, strict=True):
+                yield f'<path fill="{inside}" stroke="{rim}" d="{_path_data(straight_line(shape), step)}z"/>'
+            yield "</g>"
+        case ImageMark():
+            yield _image_element(part)
+        case TextMark():
+            (x, y), anchor = part.place, part.anchor
+            yield (
+                f'<text x="{x:.6g}" y="{y:.6g}" font-family="sans-serif" font-size="{part.size:.4g}" '
+                f'text-anchor="{anchor}" fill="{part.colour}">{part.text}</text>'
+            )
 
 
-def _ink_image(ink: NDArray[np.uint8], scale: float) -> str:
-    """The ink of a bitmap on nothing, as PNG with a palette inside the file."""
+def _image_element(part: ImageMark) -> str:
+    """The image as PNG inside the file."""
     from PIL import Image
 
-    colours, image, stream = ink_colours(), Image.fromarray(ink), io.BytesIO()
-    image.putpalette(colours[:, :3].tobytes())
-    image.save(stream, "PNG", transparency=colours[:, 3].tobytes(), optimize=True)
-    high, wide = (scale * side for side in ink.shape)
+    stream = io.BytesIO()
+    Image.fromarray(part.colours).save(stream, "PNG", optimize=True)
+    x, y, width, height = part.box
     return (
-        f'<image x="0" y="0" width="{wide:g}" height="{high:g}" preserveAspectRatio="none" '
+        f'<image x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" preserveAspectRatio="none" '
         f'xlink:href="data:image/png;base64,{base64.b64encode(stream.getvalue()).decode()}"/>'
     )
 

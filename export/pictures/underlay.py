@@ -10,7 +10,7 @@ import io
 import re
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 from xml.etree.ElementTree import ParseError
 
 import numpy as np
@@ -30,7 +30,7 @@ from .palette import LIGHT
 
 INK: Final = {"black": "#4a4a4a", "red": LIGHT["stroke"]}
 """Colours of the strokes below a field; red are those that are drawn in red."""
-_LEVELS: Final = 16  # of ink
+_LEVELS: Final = 15  # of ink, so that its picture stays small
 _LENGTH: Final = re.compile(r"(\d{1,9}(?:\.\d{1,12})?)(px|pt|pc|mm|cm|in|Q)?")
 _LOOKS_RED: Final = 0.5
 _EDGE: Final = 1e-2  # of the page: strokes that reach less far beyond it do not enlarge it
@@ -43,8 +43,8 @@ class Underlay:
 
     page: x, y, width, height, larger where strokes lie beyond it. curves: unbroken runs by colours of INK,
     each (k, 4, 2) cubics or (k, 2, 2) straight pieces. size: width and height with the units that the drawing
-    declares, as `210mm`. declared: the page as the drawing states it, None without one. ink: uint8 [h, w],
-    numbers of colours in `ink_colours`; None for curves. scale: side of a pixel of the ink.
+    declares, as `210mm`. declared: the page as the drawing states it, None without one. ink: uint8 (h, w, 4),
+    red, green, blue and opacity; None for curves. scale: side of a pixel of the ink.
     """
 
     page: Box
@@ -116,17 +116,9 @@ def _page_size(data: bytes, declared: Box | None, page: Box) -> tuple[str, str]:
 
 
 def _underlay_of_ink(picture: Bitmap) -> Underlay:
-    level = np.round((_LEVELS - 1) * picture.ink).astype(np.uint8)
-    ink = (level + np.uint8(_LEVELS) * (picture.red > _LOOKS_RED)).astype(np.uint8)
+    ink = np.zeros((*picture.ink.shape, 4), dtype=np.uint8)
+    for name, some in (("black", picture.red <= _LOOKS_RED), ("red", picture.red > _LOOKS_RED)):
+        ink[some, :3] = tuple(bytes.fromhex(INK[name][1:]))
+    ink[..., 3] = 255 // _LEVELS * np.round(_LEVELS * picture.ink)
     page = (0.0, 0.0, float(picture.width), float(picture.height))
     return Underlay(page, {}, size_in_units(page), page, ink, float(picture.reduction))
-
-
-def ink_colours() -> Any:
-    """Red, green, blue and opacity of the numbers in `Underlay.ink`, uint8 (2 * levels, 4)."""
-    opacity = np.round(np.linspace(0, 255, _LEVELS)).astype(np.uint8)
-    tables = [
-        np.column_stack([np.tile(np.frombuffer(bytes.fromhex(ink[1:]), np.uint8), (_LEVELS, 1)), opacity])
-        for ink in (INK["black"], INK["red"])
-    ]
-    return np.concatenate(tables)

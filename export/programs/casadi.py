@@ -24,7 +24,7 @@ from ...models.processes.child_program import is_stopped, on_stop
 from ..solutions.readers.ampl import write_ampl_sol
 from ..statuses import CASADI
 from .model_content import Behaviour, Points
-from .protocol import FEASIBLE, Job, Outcome, RefusedError, file_names, interrupt_self
+from .protocol import FEASIBILITY, Job, Outcome, RefusedError, file_names, interrupt_self
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +54,13 @@ class NlModel:
     def feasible_value(self, point: Floats) -> float | None:
         """The objective at a point (n,), or None when the point is not feasible."""
         objective, rows = self.evaluate(point)
-        are_whole = np.abs(point - np.round(point))[self.discrete].max(initial=0.0) <= FEASIBLE
+        are_whole = np.abs(point - np.round(point))[self.discrete].max(initial=0.0) <= FEASIBILITY
         return objective if are_whole and self.is_within_limits(point, rows) else None
 
     def is_within_limits(self, point: Floats, rows: Floats) -> bool:
         """Whether a point (n,) and the values of its rows (m,) respect their limits."""
         excess = (self.lower - point, point - self.upper, self.row_lower - rows, rows - self.row_upper)
-        return all(float(part.max(initial=0.0)) <= FEASIBLE for part in excess)
+        return all(float(part.max(initial=0.0)) <= FEASIBILITY for part in excess)
 
 
 def read_nl(path: Path) -> NlModel:

@@ -7,11 +7,7 @@ reads. The names, in the same order, come from its table of all rows and columns
 from __future__ import annotations
 
 import re
-from dataclasses import replace
 from pathlib import Path
-from typing import Any
-
-import numpy as np
 
 from ..writing.stamps import is_one_column
 from . import highs as highs_program
@@ -41,31 +37,19 @@ def read(path: Path) -> Algebra:
     output = _run(str(path), "export", copy.name, "printi", "all", "solution", listed.name)
     if re.search(r"ERROR|too many errors|not valid", output) or not copy.exists():
         raise RefusedError(f"CBC cannot read it: {' '.join(re.findall(r'.*(?:ERROR|errors).*', output)[:1])}")
-    model = highs_program.read(copy)
-    if len(model.quadratic):
-        raise RefusedError("CBC reads its products, and ignores them when it solves")
     lines = [line.removeprefix("**").split() for line in listed.read_text("utf-8").splitlines()[1:]]
-    names = [words[1] for words in lines]
-    one = next((at for at, name in enumerate(names) if is_one_column(name)), None)
-    if one is not None and len(names) == len(model.rows) + len(model.columns) + 1:
-        model = _insert_fixed_column(model, one - len(model.rows), float(lines[one][2]))
-    if len(names) != len(model.rows) + len(model.columns):
+    highs = highs_program.load_model(copy)
+    if highs.getModel().hessian_.dim_:
+        raise RefusedError("CBC reads its products, and ignores them when it solves")
+    count, size = highs.getNumRow(), highs.getNumCol()
+    # CBC does not export ONE of a problem without a constant, which is in no term; its table shows it.
+    ones = [line for line in lines if is_one_column(line[1])] if len(lines) == count + size + 1 else []
+    names = [line[1] for line in lines if line not in ones]
+    if len(names) != count + size:
         raise NotReportedError("CBC does not export what its presolve removes, and its numbers have no names")
-    return replace(model, rows=names[: len(model.rows)], columns=names[len(model.rows) :])
-
-
-def _insert_fixed_column(model: Algebra, place: int, value: float) -> Algebra:
-    """The model with a column that is fixed to a value, and in no term.
-
-    CBC does not export such a column, ONE of a problem without a constant; its table of values shows it.
-    """
-    at = model.matrix_at.copy()
-    at[:, 1] += at[:, 1] >= place
-    fixed = {"lower": value, "upper": value, "costs": 0.0, "integer": False}
-    arrays: dict[str, Any] = {
-        name: np.insert(getattr(model, name), place, number) for name, number in fixed.items()
-    }
-    return replace(model, columns=[*model.columns, ""], matrix_at=at, **arrays)
+    model = highs_program.content_of(highs, names[count:], names[:count])
+    model.columns.update({name: (float(value), float(value), False) for _, name, value, *_ in ones})
+    return model
 
 
 def solve(job: Job) -> Outcome:

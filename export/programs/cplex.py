@@ -14,9 +14,8 @@ import numpy as np
 from cplex.exceptions import CplexError, CplexSolverError
 
 from ...models.processes.child_program import on_stop
-from ..statuses import claim_of
-from ..writing.terms import Terms, terms_of_entries
-from .model_content import Algebra, finite_or_none, with_infinities
+from ..statuses import claim_of, finite_or_none
+from .model_content import Algebra, Entries, numbered, with_infinities
 from .protocol import Job, Outcome, RefusedError, TooLargeError, write_in_full
 
 _SIZE_LIMIT = 1016
@@ -47,40 +46,28 @@ def read(path: Path) -> Algebra:
     plain, products = model.linear_constraints, model.quadratic_constraints
     senses = np.array([*plain.get_senses(), *products.get_senses()])
     limits = np.array([*plain.get_rhs(), *products.get_rhs()])
-    matrix, cubes = _rows(plain, products)
     mixed = "MI" in model.problem_type[model.get_problem_type()]
     return Algebra.of(
         columns.get_names(),
         [*plain.get_names(), *products.get_names()],
+        [*numbered(goal.get_linear()), *_entries(goal, plain, products)],
         lower=with_infinities(columns.get_lower_bounds()),
         upper=with_infinities(columns.get_upper_bounds()),
         integer=[kind in "BI" for kind in (columns.get_types() if mixed else "C" * columns.get_num())],
-        costs=goal.get_linear(),
         row_lower=np.where(senses == "L", -np.inf, limits),
         row_upper=np.where(senses == "G", np.inf, limits),
-        quadratic=_hessian(goal),
-        matrix=matrix,
-        row_quadratic=cubes,
     )
 
 
-def _hessian(goal: Any) -> Terms:
-    """The quadratic terms, from both triangles of x'Qx/2."""
+def _entries(goal: Any, plain: Any, products: Any) -> Entries:
+    """The quadratic terms of the objective, from both triangles of x'Qx/2, and the entries of the rows."""
     lines = goal.get_quadratic() if goal.get_num_quadratic_nonzeros() else []
-    entries = [(i, j, q / 2) for i, line in enumerate(lines) for j, q in zip(*line.unpack(), strict=True)]
-    return terms_of_entries(entries, indices=2, products=2)
-
-
-def _rows(plain: Any, products: Any) -> tuple[Terms, Terms]:
-    lines = [*plain.get_rows(), *products.get_linear_components()]
-    linear = [(row, j, a) for row, line in enumerate(lines) for j, a in zip(*line.unpack(), strict=True)]
-    triples = enumerate(products.get_quadratic_components(), start=plain.get_num())
-    cubes = [
-        (row, i, j, a)
-        for row, part in triples
-        for i, j, a in zip(part.ind1, part.ind2, part.val, strict=True)
-    ]
-    return terms_of_entries(linear, indices=2), terms_of_entries(cubes, indices=3, products=2)
+    for i, line in enumerate(lines):
+        yield from ((None, i, j, q / 2) for j, q in zip(*line.unpack(), strict=True))
+    for row, line in enumerate([*plain.get_rows(), *products.get_linear_components()]):
+        yield from ((row, j, a) for j, a in zip(*line.unpack(), strict=True))
+    for row, part in enumerate(products.get_quadratic_components(), start=plain.get_num()):
+        yield from ((row, i, j, a) for i, j, a in zip(part.ind1, part.ind2, part.val, strict=True))
 
 
 def solve(job: Job) -> Outcome:

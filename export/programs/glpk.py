@@ -14,13 +14,11 @@ from typing import Any, Final
 import numpy as np
 
 from ..statuses import Status
-from ..writing.terms import terms_of_entries
-from .model_content import Algebra, Behaviour, Points
+from .model_content import Algebra
 from .protocol import Job, Outcome, RefusedError, run_command, run_program, write_in_full
 
 _FLAGS: Final = {"lp": "--lp", "mps": "--freemps", "mod": "--model"}
 _OBJECTIVE: Final = "energy"
-_ROUNDING: Final = 1e-14
 _IN_GAP: Final = "MIP GAP TOLERANCE REACHED"
 
 
@@ -50,66 +48,30 @@ def read(path: Path) -> Algebra:
     if head[2] != "min":
         raise RefusedError("it is not minimised")
     names = {kind: [line[3] for line in lines if line[:2] == ["n", kind]] for kind in "ij"}
-    entries = [
-        (int(i), int(j), float(value)) for key, i, j, value in (line for line in lines if line[0] == "a")
-    ]
-    if any(not j for _, j, _ in entries):
+    entries = [(int(i) - 1, int(j) - 1, float(value)) for _, i, j, value in (w for w in lines if w[0] == "a")]
+    if any(j < 0 for _, j, _ in entries):
         raise RefusedError("it has a constant besides ONE")
-    costs = np.zeros(len(names["j"]))
-    for _, j, value in (entry for entry in entries if not entry[0]):
-        costs[j - 1] = value
-    coefficients = [(i - 1, j - 1, value) for i, j, value in entries if i]
     mixed = head[1] == "mip"
-    lower, upper = _limits(lines, "j", len(costs), 3 if mixed else 2)
-    row_lower, row_upper = _limits(lines, "i", len(names["i"]), 2)
+    columns, rows = names["j"], names["i"]
+    lower, upper = _limits(lines, "j", len(columns), 3 if mixed else 2)
+    row_lower, row_upper = _limits(lines, "i", len(rows), 2)
     continuous = {int(line[1]) - 1 for line in lines if line[0] == "j" and line[2] == "c"}
-    integer = [mixed and place not in continuous for place in range(len(costs))]  # binary by default
+    if path.suffix == ".mod":
+        columns, rows = _our_names(columns, path), _our_names(rows, path)
     model = Algebra.of(
-        names["j"],
-        names["i"],
+        columns,
+        rows,
+        ((None if i < 0 else i, j, value) for i, j, value in entries),
         lower=lower,
         upper=upper,
-        integer=integer,
-        costs=costs,
+        integer=[mixed and place not in continuous for place in range(len(columns))],  # binary by default
         row_lower=row_lower,
         row_upper=row_upper,
-        matrix=terms_of_entries(coefficients, indices=2),
     )
-    return _without_objective(model, path) if path.suffix == ".mod" else model
-
-
-def evaluate(path: Path, points: Points) -> Behaviour:
-    """The AMPL model as GLPK reads it, without columns in no term, as in AMPL."""
-    model = read(path)
-    values = points.of(model.columns)
-    return Behaviour(
-        model.columns,
-        model.lower,
-        model.upper,
-        model.integer,
-        model.rows,
-        model.row_lower,
-        model.row_upper,
-        model.objective(values),
-        model.activities(values),
-        rounding=_ROUNDING,
-        may_lack=True,
-    )
-
-
-def _without_objective(model: Algebra, path: Path) -> Algebra:
-    """The model with our names, without the objective among the rows."""
-    goal = model.rows.index(_OBJECTIVE)
-    places = model.matrix_at[model.matrix_at[:, 0] != goal]
-    return replace(
-        model,
-        columns=_our_names(model.columns, path),
-        rows=_our_names([name for name in model.rows if name != _OBJECTIVE], path),
-        row_lower=np.delete(model.row_lower, goal),
-        row_upper=np.delete(model.row_upper, goal),
-        matrix_at=np.stack([places[:, 0] - (places[:, 0] > goal), places[:, 1]], axis=1),
-        matrix=model.matrix[model.matrix_at[:, 0] != goal],
-    )
+    if model.rows.pop(_OBJECTIVE, None) is not None:  # of a .mod
+        terms = {key: value for key, value in model.terms.items() if key[0] != _OBJECTIVE}
+        return replace(model, terms=terms)
+    return model
 
 
 def _our_names(names: list[str], path: Path) -> list[str]:
@@ -123,6 +85,8 @@ def _our_names(names: list[str], path: Path) -> list[str]:
 
 
 def _our_name(name: str, digits: dict[int, int]) -> str:
+    if name == _OBJECTIVE:
+        return name
     stem, index = name.removesuffix("]").split("[")
     parts = index.split(",")
     width = digits[sum(map(str.isdigit, parts))]

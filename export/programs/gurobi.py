@@ -11,8 +11,8 @@ import gurobipy
 import numpy as np
 
 from ...models.processes.child_program import on_stop
-from ..writing.terms import Terms, terms_of_entries
-from .model_content import Algebra, finite_or_none
+from ..statuses import finite_or_none
+from .model_content import Algebra, Entries, numbered
 from .protocol import Job, Outcome, RefusedError, TooLargeError, write_in_full
 
 _SIZE_LIMIT = 10010
@@ -42,35 +42,29 @@ def read(path: Path) -> Algebra:
         limits = np.array([r.RHS for r in plain] + [r.QCRHS for r in products])
         goal = model.getObjective()
         square = _products(goal) if isinstance(goal, gurobipy.QuadExpr) else []
-        matrix, cubes = _rows(model, plain, products)
+        entries = [*numbered(model.getAttr("Obj", variables)), *((None, *product) for product in square)]
         return Algebra.of(
             [v.VarName for v in variables],
             [r.ConstrName for r in plain] + [r.QCName for r in products],
+            [*entries, *_row_entries(model, len(plain), products)],
             lower=model.getAttr("LB", variables),
             upper=model.getAttr("UB", variables),
             integer=[v.VType in "BI" for v in variables],
-            costs=model.getAttr("Obj", variables),
             row_lower=np.where(senses == "<", -np.inf, limits),
             row_upper=np.where(senses == ">", np.inf, limits),
-            quadratic=terms_of_entries(square, indices=2, products=2),
-            matrix=matrix,
-            row_quadratic=cubes,
         )
 
 
-def _rows(model: Any, plain: list[Any], products: list[Any]) -> tuple[Terms, Terms]:
+def _row_entries(model: Any, plain: int, products: list[Any]) -> Entries:
+    """The entries of that many linear rows, and of the quadratic ones after them."""
     sparse = model.getA().tocoo()
-    linear = list(zip(sparse.row.tolist(), sparse.col.tolist(), sparse.data.tolist(), strict=True))
-    cubes = []
-    for place, row in enumerate(products, start=len(plain)):
+    yield from zip(sparse.row.tolist(), sparse.col.tolist(), sparse.data.tolist(), strict=True)
+    for place, row in enumerate(products, start=plain):
         expression = model.getQCRow(row)
-        cubes += [(place, *product) for product in _products(expression)]
-        linear_part = expression.getLinExpr()
-        linear += [
-            (place, linear_part.getVar(term).index, linear_part.getCoeff(term))
-            for term in range(linear_part.size())
-        ]
-    return terms_of_entries(linear, indices=2), terms_of_entries(cubes, indices=3, products=2)
+        yield from ((place, *product) for product in _products(expression))
+        linear = expression.getLinExpr()
+        for term in range(linear.size()):
+            yield place, linear.getVar(term).index, linear.getCoeff(term)
 
 
 def _products(expression: Any) -> list[tuple[int, int, float]]:

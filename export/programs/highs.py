@@ -10,8 +10,9 @@ import numpy as np
 
 from ...models.errors import OutputError
 from ...models.processes.child_program import is_stopped
-from ..writing.terms import merged_terms, terms_of_triangle
-from .model_content import Algebra, finite_or_none
+from ..quiet_highs import new_model
+from ..statuses import finite_or_none
+from .model_content import Algebra, entries_of_triangle, numbered
 from .protocol import Job, Outcome, RefusedError, write_in_full
 
 _RAW: Final = 0
@@ -22,11 +23,7 @@ _TICK: Final = 0.1
 
 def version() -> str:
     """Version of HiGHS."""
-    return str(_model().version())
-
-
-def _model() -> Any:
-    return highspy.Highs()  # type: ignore[no-untyped-call]
+    return str(new_model().version())
 
 
 def load_model(path: Path, *, silent: bool = True, **options: str | float) -> Any:
@@ -34,7 +31,7 @@ def load_model(path: Path, *, silent: bool = True, **options: str | float) -> An
 
     The options are set afterwards: HiGHS applies a time limit to reading too and then reports an error.
     """
-    highs = _model()
+    highs = new_model() if silent else highspy.Highs()  # type: ignore[no-untyped-call]
     set_options(highs, output_flag="false" if silent else "true")
     if highs.readModel(str(path)) == highspy.HighsStatus.kError:
         raise RefusedError("HiGHS cannot read it", file=path)
@@ -62,19 +59,29 @@ def write_solution(highs: Any, solution: Path) -> None:
 def read(path: Path) -> Algebra:
     """The file as HiGHS reads it."""
     highs = load_model(path)
+    return content_of(highs, list(highs.getLp().col_names_), list(highs.getLp().row_names_))
+
+
+def content_of(highs: Any, columns: list[str], rows: list[str]) -> Algebra:
+    """The content of a model, with names of its columns and rows."""
     lp, hessian = highs.getLp(), highs.getModel().hessian_
     if lp.sense_ != highspy.ObjSense.kMinimize or lp.offset_ != 0:
         raise RefusedError("it is not minimised, or has a constant besides ONE")
-    content: dict[str, Any] = {"lower": lp.col_lower_, "upper": lp.col_upper_, "costs": lp.col_cost_}
-    content |= {"row_lower": lp.row_lower_, "row_upper": lp.row_upper_}
-    if len(lp.integrality_):
-        content["integer"] = [kind == highspy.HighsVarType.kInteger for kind in lp.integrality_]
     column, row, value = _columnwise(lp.a_matrix_, lp.num_col_)
-    content["matrix"] = merged_terms(np.stack([row, column], axis=1), value, indices=2)
-    if hessian.dim_:
-        column, row, value = _columnwise(hessian, hessian.dim_)  # the lower triangle of x'Qx/2
-        content["quadratic"] = terms_of_triangle(row, column, value)
-    return Algebra.of(list(lp.col_names_), list(lp.row_names_), **content)
+    entries: list[Any] = [*numbered(lp.col_cost_)]
+    entries += zip(row.tolist(), column.tolist(), value.tolist(), strict=True)
+    if hessian.dim_:  # the lower triangle of x'Qx/2
+        entries += entries_of_triangle(*_columnwise(hessian, hessian.dim_))
+    return Algebra.of(
+        columns,
+        rows,
+        entries,
+        lower=lp.col_lower_,
+        upper=lp.col_upper_,
+        integer=[kind == highspy.HighsVarType.kInteger for kind in lp.integrality_] or [False] * lp.num_col_,
+        row_lower=lp.row_lower_,
+        row_upper=lp.row_upper_,
+    )
 
 
 def _columnwise(matrix: Any, columns: int) -> tuple[Any, Any, Any]:

@@ -7,83 +7,73 @@ values of objective and rows at points, as readers of .nl and GAMS report them.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Self
 
 import numpy as np
 
 from ...models.instance.domain import Bools, Floats, Ints
-from ..writing.terms import Terms, merged_terms
+from .protocol import RefusedError
 
 _INFINITY: Final = 1e20
-_INFINITE_BOUND: Final = 1e19
 
 
-@dataclass(frozen=True, eq=False)
+Entries = Iterable[tuple[Any, ...]]
+"""Coefficients: number of a row, or None for the objective, numbers of one column or two, and the value."""
+
+
+@dataclass(frozen=True)
 class Algebra:
-    """A quadratic model: costs, limits and coefficients in the order of `columns` and `rows`.
+    """A quadratic model by the names of its columns and rows.
 
-    quadratic: coefficient of x_i x_j for i <= j, at quadratic_at (k, 2); matrix at (row, column);
-    row_quadratic at (row, i, j).
+    columns: lower and upper bound of each, and whether it is integer. rows: left and right side of each.
+    terms: coefficients that are not 0, by name of the row, empty for the objective, and names of columns.
     """
 
-    columns: list[str]
-    lower: Floats
-    upper: Floats
-    integer: Bools
-    costs: Floats
-    quadratic_at: Ints
-    quadratic: Floats
-    rows: list[str]
-    row_lower: Floats
-    row_upper: Floats
-    matrix_at: Ints
-    matrix: Floats
-    row_quadratic_at: Ints
-    row_quadratic: Floats
+    columns: dict[str, tuple[float, float, bool]]
+    rows: dict[str, tuple[float, float]]
+    terms: dict[tuple[str, ...], float]
 
     @classmethod
-    def of(cls, columns: list[str], rows: list[str], **facts: Any) -> Self:
-        """The model; `quadratic`, `matrix` and `row_quadratic` are given as Terms or left out."""
-        for name, width in (("quadratic", 2), ("matrix", 2), ("row_quadratic", 3)):
-            found = facts.pop(name, None) or Terms(np.zeros((0, width), np.int64), np.zeros(0))
-            facts |= {f"{name}_at": found.at, name: found.value}
-        arrays = {"integer": np.zeros(len(columns), dtype=bool)} | facts
-        kinds = {name: bool if name == "integer" else None for name in arrays}
-        return cls(columns=columns, rows=rows, **{key: np.asarray(arrays[key], kinds[key]) for key in arrays})
+    def of(
+        cls,
+        columns: Sequence[str],
+        rows: Sequence[str],
+        entries: Entries,
+        *,
+        lower: Any,
+        upper: Any,
+        integer: Any,
+        row_lower: Any,
+        row_upper: Any,
+    ) -> Self:
+        """The model with these entries, equal ones added up. Raises RefusedError for a name that is twice."""
+        if len({*columns}) < len(columns) or len({*rows}) < len(rows):
+            raise RefusedError("it gives two columns or rows one name")
+        terms: dict[tuple[str, ...], float] = {}
+        for row, *at, value in entries:
+            key = ("" if row is None else rows[row], *sorted(columns[column] for column in at))
+            terms[key] = terms.get(key, 0.0) + float(value)
+        limits = named_limits(columns, lower, upper, integer), named_limits(rows, row_lower, row_upper)
+        return cls(*limits, {key: value for key, value in terms.items() if value})
 
-    def objective(self, points: Floats) -> Floats:
-        """The objective at points (k, columns)."""
-        first, second = self.quadratic_at.T
-        return points @ self.costs + (points[:, first] * points[:, second]) @ self.quadratic
 
-    def activities(self, points: Floats) -> Floats:
-        """The rows at points (k, columns), shape (k, rows)."""
-        values = np.zeros((len(points), len(self.rows)))
-        row, column = self.matrix_at.T
-        np.add.at(values.T, row, (points[:, column] * self.matrix).T)
-        row, first, second = self.row_quadratic_at.T
-        np.add.at(values.T, row, (points[:, first] * points[:, second] * self.row_quadratic).T)
-        return values
+def named_limits(names: Sequence[str], lower: Any, upper: Any, *more: Any) -> dict[str, Any]:
+    """Both limits of each column or row, and what more there is, by its name."""
+    parts = (np.asarray(part).tolist() for part in (lower, upper, *more))
+    return dict(zip(names, zip(*parts, strict=True), strict=True))
 
-    def reordered(self, columns: list[str], rows: list[str]) -> Algebra:
-        """The same model with its columns and rows in another order."""
-        c, r = positions_of(self.columns, columns), positions_of(self.rows, rows)
-        back_c, back_r = np.argsort(c), np.argsort(r)
-        per_column = {name: getattr(self, name)[c] for name in ("lower", "upper", "integer", "costs")}
-        per_row = {name: getattr(self, name)[r] for name in ("row_lower", "row_upper")}
-        matrix = np.stack([back_r[self.matrix_at[:, 0]], back_c[self.matrix_at[:, 1]]], axis=1)
-        cubes = np.column_stack([back_r[self.row_quadratic_at[:, 0]], back_c[self.row_quadratic_at[:, 1:]]])
-        return Algebra.of(
-            columns,
-            rows,
-            **per_column,
-            **per_row,
-            quadratic=merged_terms(back_c[self.quadratic_at], self.quadratic, indices=2, products=2),
-            matrix=merged_terms(matrix, self.matrix, indices=2),
-            row_quadratic=merged_terms(cubes, self.row_quadratic, indices=3, products=2),
-        )
+
+def numbered(values: Any) -> Iterator[tuple[None, int, float]]:
+    """The entries of linear costs."""
+    return ((None, column, value) for column, value in enumerate(values))
+
+
+def entries_of_triangle(row: Any, column: Any, value: Any) -> Iterator[tuple[None, int, int, float]]:
+    """The entries of an objective x'Qx/2, given by one triangle."""
+    triples = zip(*(np.asarray(part).tolist() for part in (row, column, value)), strict=True)
+    return ((None, i, j, q / 2 if i == j else q) for i, j, q in triples)
 
 
 def positions_of(have: list[str], wanted: list[str]) -> Ints:
@@ -134,8 +124,3 @@ def with_infinities(values: Sequence[float]) -> Floats:
     """Bounds with infinity from 1e20 on, as in CPLEX and Xpress."""
     bounds = np.array(values, dtype=float)
     return np.where(np.abs(bounds) >= _INFINITY, np.copysign(np.inf, bounds), bounds)
-
-
-def finite_or_none(value: float | None) -> float | None:
-    """Return the number, or None for a number that represents infinity."""
-    return None if value is None or abs(value) >= _INFINITE_BOUND else float(value)

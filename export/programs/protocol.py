@@ -28,7 +28,7 @@ from ...models.processes.child_program import is_stopped, on_stop
 from ...models.processes.deadline import Deadline
 from ..statuses import Status
 
-FEASIBLE: Final = 1e-6
+FEASIBILITY: Final = 1e-6
 """Violation up to which a point counts as feasible: the solvers' own tolerance."""
 _WRITING: Final = 0.2
 _LEAST: Final = 0.01

@@ -15,10 +15,9 @@ import numpy as np
 import pyscipopt
 
 from ...models.processes.child_program import on_stop
-from ..statuses import claim_of
+from ..statuses import claim_of, finite_or_none
 from ..writing.stamps import is_one_column
-from ..writing.terms import Terms, terms_of_entries
-from .model_content import Algebra, Behaviour, Points, finite_or_none
+from .model_content import Algebra, Behaviour, Entries, Points, numbered
 from .protocol import Job, Outcome, RefusedError, file_names, write_in_full
 
 _INFINITY: Final = 1e19  # SCIP's is 1e20
@@ -53,24 +52,21 @@ def read(path: Path) -> Algebra:
     rows = [row for row in scip.getConss() if row.name not in _OBJECTIVE_ROWS]
     goals = [row for row in scip.getConss() if row.name in _OBJECTIVE_ROWS]
     number = {v.name: place for place, v in enumerate(variables)}
-    matrix, cubes = _terms(scip, rows, number)
-    beside, squares = _terms(scip, goals, number)
-    if len(beside.value):
+    entries = [*numbered(v.getObj() for v in variables), *_entries(scip, rows, number)]
+    squares = list(_entries(scip, goals, number))
+    if any(value for _, *at, value in squares if len(at) == 1):
         raise RefusedError("its quadratic objective has linear terms besides the costs")
     lower, upper = _limits([(v.getLbOriginal(), v.getUbOriginal()) for v in variables])
     row_lower, row_upper = _limits([(scip.getLhs(row), scip.getRhs(row)) for row in rows])
     return Algebra.of(
         list(number),
         [row.name for row in rows],
+        [*entries, *((None, *entry) for _, *entry in squares if len(entry) > 2)],
         lower=lower,
         upper=upper,
         integer=[v.vtype() in {"BINARY", "INTEGER"} for v in variables],
-        costs=[v.getObj() for v in variables],
         row_lower=row_lower,
         row_upper=row_upper,
-        quadratic=Terms(squares.at[:, 1:], squares.value),
-        matrix=matrix,
-        row_quadratic=cubes,
     )
 
 
@@ -79,22 +75,20 @@ def _limits(ends: list[tuple[float, float]]) -> tuple[Any, Any]:
     return np.where(lower < -_INFINITY, -np.inf, lower), np.where(upper > _INFINITY, np.inf, upper)
 
 
-def _terms(scip: Any, rows: list[Any], number: dict[str, int]) -> tuple[Terms, Terms]:
-    """Linear and quadratic terms of rows, without the variable that represents the objective."""
-    linear: list[tuple[int, int, float]] = []
-    square: list[tuple[int, int, int, float]] = []
+def _entries(scip: Any, rows: list[Any], number: dict[str, int]) -> Entries:
+    """The entries of rows, without the variable that represents the objective."""
     for place, row in enumerate(rows):
         if row.getConshdlrName() == "linear":
-            linear += [(place, number[name], value) for name, value in scip.getValsLinear(row).items()]
+            yield from ((place, number[name], value) for name, value in scip.getValsLinear(row).items())
             continue
         if not scip.checkQuadraticNonlinear(row):
             raise RefusedError(f"row {row.name} is not quadratic there")
-        products, squares, linear_part = scip.getTermsQuadratic(row)
-        square += [(place, number[a.name], number[b.name], value) for a, b, value in products]
-        square += [(place, number[v.name], number[v.name], value) for v, value, _ in squares]
-        linear += [(place, number[v.name], cost) for v, _, cost in squares]
-        linear += [(place, number[v.name], value) for v, value in linear_part if v.name in number]
-    return terms_of_entries(linear, indices=2), terms_of_entries(square, indices=3, products=2)
+        products, squares, linear = scip.getTermsQuadratic(row)
+        yield from ((place, number[a.name], number[b.name], value) for a, b, value in products)
+        for v, value, cost in squares:
+            yield place, number[v.name], number[v.name], value
+            yield place, number[v.name], cost
+        yield from ((place, number[v.name], value) for v, value in linear if v.name in number)
 
 
 def evaluate(path: Path, points: Points) -> Behaviour:

@@ -13,9 +13,8 @@ with warnings.catch_warnings(action="ignore"):  # it prints which licence it use
 
 from ...models.processes.child_program import on_stop
 from ...models.storage import replacing
-from ..statuses import claim_of
-from ..writing.terms import Terms, merged_terms, terms_of_entries, terms_of_triangle
-from .model_content import Algebra, finite_or_none, with_infinities
+from ..statuses import claim_of, finite_or_none
+from .model_content import Algebra, Entries, entries_of_triangle, numbered, with_infinities
 from .protocol import Job, Outcome, RefusedError, TooLargeError
 
 _ROWS, _COLUMNS = 1, 2
@@ -52,36 +51,30 @@ def read(path: Path) -> Algebra:
     kinds, limits = np.array(model.getRowType(0, m - 1)), np.array(model.getRHS(0, m - 1))
     start, column, value = (np.array(part) for part in model.getRows(0, m - 1))
     row = np.repeat(np.arange(m), np.diff(start))
+    linear = zip(row.tolist(), column.tolist(), value.tolist(), strict=True)
     return Algebra.of(
         list(model.getNameList(_COLUMNS, 0, n - 1)),
         list(model.getNameList(_ROWS, 0, m - 1)),
+        [*numbered(model.getObj(0, n - 1)), *_hessian(model, n), *linear, *_row_products(model)],
         lower=with_infinities(model.getLB(0, n - 1)),
         upper=with_infinities(model.getUB(0, n - 1)),
         integer=[kind in "BI" for kind in model.getColType(0, n - 1)],
-        costs=model.getObj(0, n - 1),
         row_lower=np.where(kinds == "L", -np.inf, limits),
         row_upper=np.where(kinds == "G", np.inf, limits),
-        quadratic=_hessian(model, n),
-        matrix=merged_terms(np.stack([row, column], axis=1), value, indices=2),
-        row_quadratic=_row_products(model),
     )
 
 
-def _hessian(model: Any, n: int) -> Terms:
+def _hessian(model: Any, n: int) -> Entries:
     """The quadratic terms, from the upper triangle of x'Qx/2."""
     start, column, value = (np.array(part) for part in model.getMQObj(0, n - 1))
-    row = np.repeat(np.arange(n, dtype=np.int32), np.diff(start) if len(value) else 0)
-    return terms_of_triangle(row, column.astype(np.int32), value.astype(float))
+    return entries_of_triangle(np.repeat(np.arange(n), np.diff(start) if len(value) else 0), column, value)
 
 
-def _row_products(model: Any) -> Terms:
+def _row_products(model: Any) -> Entries:
     """The products of rows, from one triangle of x'Qx."""
-    entries = [
-        (int(row), int(i), int(j), q if i == j else 2 * q)
-        for row in model.getQRows()
-        for i, j, q in zip(*model.getQRowQMatrixTriplets(row), strict=True)
-    ]
-    return terms_of_entries(entries, indices=3, products=2)
+    for row in model.getQRows():
+        for i, j, q in zip(*model.getQRowQMatrixTriplets(row), strict=True):
+            yield int(row), int(i), int(j), q if i == j else 2 * q
 
 
 def solve(job: Job) -> Outcome:

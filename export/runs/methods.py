@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -18,7 +18,7 @@ from ...models.processes.job_counts import cores
 from ...models.processes.limits import Limits
 from ...models.search.box_qp import fit_in_box
 from ...models.search.greedy import greedy_field
-from ...models.search.search import Search, search
+from ...models.search.search import search
 from ...models.search.starts import first_field, polyvector_start, start_fields
 from ...models.smooth.bend import bend_field
 from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
@@ -46,7 +46,7 @@ class Candidate:
     seconds: float
     solution: Solution | None = None
     interrupted: bool = False
-    counts: tuple[tuple[str, int], ...] = ()
+    counts: Mapping[str, int] | None = None
     proof: Proof | None = None
 
     def facts(self) -> dict[str, Any]:
@@ -56,7 +56,7 @@ class Candidate:
             **self.field.facts(),
             "seconds": round(self.seconds, 3),
             "interrupted": self.interrupted,
-            **dict(self.counts),
+            **(self.counts or {}),
         }
         return facts if self.solution is None else facts | self.solution.facts()
 
@@ -92,10 +92,6 @@ class Request:
     progress: Progress = silent
     stop: IsOver = never
     clock: Clock = time.monotonic
-
-    def __post_init__(self) -> None:
-        """Refuse limits without a time limit. Raises InputError."""
-        Limits.finite_or_default(self.limits)
 
     def deadline(self) -> Deadline:
         """Return the end of the time limit, counted from now."""
@@ -137,30 +133,30 @@ class Method:
 def _find_greedy(request: Request) -> Iterator[Candidate]:
     request.progress("greedy field")
     is_over = request.stop_at_limit()
-    yield _time_candidate("greedy", lambda: greedy_field(request.instance, stop=is_over))
+    yield time_candidate("greedy", lambda: greedy_field(request.instance, stop=is_over))
 
 
 def _find_power(request: Request) -> Iterator[Candidate]:
     request.progress("power field")
     is_over = request.stop_at_limit()
-    power = _time_candidate("power", lambda: power_field(request.instance))
+    power = time_candidate("power", lambda: power_field(request.instance))
     yield power
-    yield _time_candidate("power + QP", lambda: fit_in_box(power.field, is_over))
+    yield time_candidate("power + QP", lambda: fit_in_box(power.field, is_over))
 
 
 def _find_polyvector(request: Request) -> Iterator[Candidate]:
     request.progress("PolyVector field")
     is_over = request.stop_at_limit()
-    yield _time_candidate("polyvector", lambda: polyvector_field(request.instance))
+    yield time_candidate("polyvector", lambda: polyvector_field(request.instance))
     if not is_over():
-        yield _time_candidate("polyvector + QP", lambda: polyvector_start(request.instance, is_over))
+        yield time_candidate("polyvector + QP", lambda: polyvector_start(request.instance, is_over))
 
 
 def _find_bend(request: Request) -> Iterator[Candidate]:
     request.progress("bend field")
     is_over = request.stop_at_limit()
     hard = polyvector_field(request.instance, hold=max(HOLDS))
-    yield _time_candidate("bend", lambda: bend_field(hard, stop=is_over))
+    yield time_candidate("bend", lambda: bend_field(hard, stop=is_over))
 
 
 def _find_by_search(request: Request) -> Iterator[Candidate]:
@@ -169,32 +165,20 @@ def _find_by_search(request: Request) -> Iterator[Candidate]:
     result = search(
         request.instance,
         limits=request.limits.until(deadline),
-        jobs=_count_processes(request),
+        jobs=request.limits.threads or cores(),
         start=request.start,
-        progress=_report_search(request, deadline),
+        progress=lambda line: request.progress(
+            f"search: {line}, at most {deadline.left():.0f} s more; Ctrl-C keeps the best field so far"
+        ),
         stop=request.stop,
     )
-    yield _search_candidate("search", result, begin, rounds=result.rounds)
-
-
-def _search_candidate(method: str, result: Search, begin: float, **counts: int) -> Candidate:
-    """The candidate of a search that began at a time of the performance counter."""
-    seconds, interrupted = time.perf_counter() - begin, result.ended == "interrupted"
-    return Candidate(method, result.field, seconds, interrupted=interrupted, counts=tuple(counts.items()))
-
-
-def _count_processes(request: Request) -> int:
-    return request.limits.threads or cores()
-
-
-def _report_search(request: Request, deadline: Deadline) -> Progress:
-    """A callback that passes on the lines of a search, with the time left and what Ctrl-C keeps."""
-
-    def report(line: str) -> None:
-        left = f"at most {deadline.left():.0f} s more"
-        request.progress(f"search: {line}, {left}; Ctrl-C keeps the best field so far")
-
-    return report
+    yield Candidate(
+        "search",
+        result.field,
+        time.perf_counter() - begin,
+        interrupted=result.ended == "interrupted",
+        counts={"rounds": result.rounds},
+    )
 
 
 def _find_by_proof(request: Request) -> Iterator[Candidate]:
@@ -202,23 +186,26 @@ def _find_by_proof(request: Request) -> Iterator[Candidate]:
     from ...models.proof.prove import prove  # it loads compiled functions
 
     request.progress("prove: starting fields")
-    loading = time.perf_counter() - begin
     proof = prove(
         request.instance,
         start=request.start,
         limits=request.limits.until(deadline),
-        jobs=_count_processes(request),
+        jobs=request.limits.threads or cores(),
         progress=lambda line: request.progress(f"prove: {line}; Ctrl-C keeps them"),
         stop=request.stop,
     )
-    begin = time.perf_counter()
     field = proof.field
     if request.instance.gauge == "box":
         near = field_in_windows(request.instance, field.alpha, field.beta, field.p)
         field = start_fields(request.instance, near, request.stop)[0]
-    counts = (("levels", len(proof.levels)), ("forced_jumps", proof.forced))
-    seconds = loading + proof.seconds + time.perf_counter() - begin
-    yield Candidate("prove", field, seconds, None, proof.ended == "interrupted", counts, proof)
+    yield Candidate(
+        "prove",
+        field,
+        time.perf_counter() - begin,
+        interrupted=proof.ended == "interrupted",
+        counts={"levels": len(proof.levels), "forced_jumps": proof.forced},
+        proof=proof,
+    )
 
 
 def _find_in_two_stages(request: Request) -> Iterator[Candidate]:
@@ -322,7 +309,8 @@ def find_method(name: str, instance: Instance) -> Method:
     return METHODS[name]
 
 
-def _time_candidate(method: str, find: Callable[[], CrossField]) -> Candidate:
+def time_candidate(method: str, find: Callable[[], CrossField]) -> Candidate:
+    """The field that a function finds, with the seconds that it takes."""
     begin = time.perf_counter()
     field = find()
     return Candidate(method, field, time.perf_counter() - begin)

@@ -1,25 +1,19 @@
-"""The page of a run: one HTML file that shows what its folder contains, without a network or a script."""
+"""The page of a run: a file in its folder that shows what is there, without a network."""
 
 from __future__ import annotations
 
-import io
 import json
-from base64 import b64encode
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 from ...models.field.field import CrossField
-from ...models.formulations.catalogue import declare
 from ...models.instance.mesh import Mesh
 from ...models.storage import read_bytes, write_bytes
 from ...templates import ENVIRONMENT
 from ..bundle.manifest import Manifest
 from ..formats.registry import FORMATS
 from ..pictures.mesh_view import model_data
-from ..solvers_table import BUNDLED, smallest_problem, suitability
-from ..surfaces.files import encode_png
+from ..solvers_table import BUNDLED
 from .methods import table_cells
 
 PAGE: Final = "index.html"
@@ -33,7 +27,6 @@ _LAYERS: Final = (
     ("singularities", True),
 )
 """Layers of overlay.svg, and whether they are shown at first."""
-_SHADED: Final = 1000  # pixels on the longer side of the surface on the page
 _COLUMNS: Final = ("1-norm", "off strokes", "lines < 45°", "singularities", "seconds")
 _FILES: Final = {
     "field.npz": "the field that is kept; also .json, and .rawfield with .obj and .sings",
@@ -70,13 +63,11 @@ def write_page(
         report=report,
         on_mesh="faces" in report["instance"],
         model=_model_of(field),
-        crosses=_embed_picture(folder / "crosses.png") if "crosses.png" in names else "",
+        names=names,
         seconds=f"{report['seconds']:.0f}",
         bound=report["proof"] and f"{report['proof']['bound_2_norm']:.6g}",
         layers=[entry for entry in _LAYERS if entry[0] != "drawing" or 'id="drawing"' in overlay],
         overlay=overlay,
-        overview=_embed_picture(folder / "overview.png") if "overview.png" in names else "",
-        shaded=_embed_picture(folder / "shaded.png", _SHADED) if "shaded.png" in names else "",
         columns=["method", "2-norm", *["gap"] * bool(report["proof"]), *_COLUMNS],
         methods=[
             [facts["method"] + (" (kept)" if facts["method"] == report["kept"] else ""), *table_cells(facts)]
@@ -99,18 +90,6 @@ def _read_svg(path: Path) -> str:
     return read_bytes(path).decode().partition("?>\n")[2]
 
 
-def _embed_picture(path: Path, side: int | None = None) -> str:
-    """A PNG as the address that contains it, with at most `side` pixels on its longer side."""
-    data = read_bytes(path)
-    if side is not None:
-        from PIL import Image
-
-        with Image.open(io.BytesIO(data)) as picture:
-            picture.thumbnail((side, side))
-            data = encode_png(np.asarray(picture))
-    return f"data:image/png;base64,{b64encode(data).decode()}"
-
-
 def _describe_set(manifest: Manifest) -> dict[str, Any]:
     """The model files of a formulation, each with the lines that solve it and read its answer.
 
@@ -118,12 +97,10 @@ def _describe_set(manifest: Manifest) -> dict[str, Any]:
     """
     document = manifest.document
     counts = document["counts"]
-    problem = smallest_problem(declare(manifest.formulation))
-    solver = next((name for name in BUNDLED if suitability(problem, name).answer == "yes"), "")
+    solver = next((name for name in BUNDLED if document["solvers"][name]["answer"] == "yes"), "")
     name, instance = manifest.formulation, f"models/{document['instance']['file']}"
-    facet = " --facet printed" if document["options"].get("facet") == "printed" else ""
     return {
-        "solve": solver and f"crossfield solve {instance} -f {name}{facet} --solver {solver} -o {name}",
+        "solve": solver and f"crossfield solve {instance} -f {name} --solver {solver} -o {name}",
         "solver": solver and BUNDLED[solver].title,
         "formulation": document["formulation"],
         "kind": document["class"],

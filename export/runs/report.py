@@ -1,22 +1,21 @@
-"""The report of a run: its fields, what was proven about them, and the seconds of its stages."""
+"""The report of a run: its fields, and what was proven about them."""
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
-from ...models.processes.deadline import Clock
+from ...models.proof.checkers.check_certificate import gap_of, status_of
 from ...models.surface.surface import Surface
 from ..bundle.manifest import Manifest
 from ..formats.registry import FORMATS, program_version
 from ..surfaces.files import SHADED, surface_facts
 from .methods import Candidate
-from .proven import ProvenBound
 
+CERTIFICATE: Final = "certificate.npz"
 KEPT: Final = "bend"
 """The method whose field is kept; docs/evidence.md has the measurements."""
 
@@ -38,10 +37,10 @@ class Report:
     interrupted
         The method, `compiling`, `certificate`, `drawing` or `surface` during which the run was interrupted;
         else empty.
-    proven
-        Proven bound of the 2-norm energy of all fields, or None.
-    stages
-        Seconds of each stage, in order; `waiting` is the wait for what is computed during others.
+    bound
+        Proven lower bound of the 2-norm energy of all fields, or None.
+    seconds
+        Seconds of the run until its report was written.
     surface
         Surface over the kept field; None if the run stopped earlier.
     folder
@@ -54,16 +53,24 @@ class Report:
     manifests: tuple[Manifest, ...]
     failures: dict[str, str] = field(default_factory=dict)
     interrupted: str = ""
-    proven: ProvenBound | None = None
-    stages: dict[str, float] = field(default_factory=dict)
+    bound: float | None = None
+    seconds: float = 0.0
     surface: Surface | None = None
     folder: Path = Path()
+
+    def __repr__(self) -> str:
+        bound = "" if self.bound is None else f", bound {self.bound:.6g}"
+        best = (
+            f", least energy {self.best.field.energy().total:.6g} by {self.best.method}"
+            if self.candidates
+            else ""
+        )
+        return f"<Report on {self.instance.name}: {len(self.candidates)} fields{best}{bound}>"
 
     def moved_to(self, folder: Path) -> Report:
         """The report after its files have moved to another folder."""
         manifests = tuple(manifest.moved_to(folder / "models") for manifest in self.manifests)
-        proven = self.proven and ProvenBound(self.proven.bound, folder / self.proven.certificate.name)
-        return replace(self, folder=folder, manifests=manifests, proven=proven)
+        return replace(self, folder=folder, manifests=manifests)
 
     @property
     def best(self) -> Candidate:
@@ -86,20 +93,31 @@ class Report:
         return self.surface is not None and not self.surface.doubts
 
     def facts(self, candidate: Candidate) -> dict[str, Any]:
-        """Facts of a field in the report: its own, and bound and gap if they are proven."""
+        """Facts of a field in the report: its own, and bound and gap if there is a proven bound."""
         facts = candidate.facts()
-        return facts if self.proven is None else facts | self.proven.facts(facts["energy_2_norm"])
+        if self.bound is None:
+            return facts
+        return facts | {
+            "bound_2_norm": self.bound,
+            "gap_2_norm": gap_of(facts["energy_2_norm"], self.bound),
+            "proven_optimal": status_of(facts["energy_2_norm"], self.bound) == "optimal",
+        }
+
+    @property
+    def proof(self) -> dict[str, Any] | None:
+        """The proven bound, and the gap to it of the best field; None without a bound."""
+        if self.bound is None:
+            return None
+        facts = self.facts(self.best)
+        status = "optimal" if facts["proven_optimal"] else "gap"
+        stated = {key: facts[key] for key in ("bound_2_norm", "gap_2_norm")}
+        return {"status": status, **stated, "certificate": CERTIFICATE}
 
     @property
     def files(self) -> int:
         """Number of model files, lists of names and data beside them not counted."""
         files = [entry for manifest in self.manifests for entry in manifest.document["files"]]
         return sum(FORMATS[entry["format"]].is_model(entry["name"]) for entry in files)
-
-    @property
-    def seconds(self) -> float:
-        """All seconds of the run until its report was written: the sum of the stages."""
-        return round(sum(self.stages.values()), 3)
 
     def document(self) -> dict[str, Any]:
         """The report as JSON: instance, methods, files."""
@@ -112,12 +130,11 @@ class Report:
             "warnings": list(instance.reading.warnings if instance.reading else ()),
             "kept": self.kept.method,
             "best": self.best.method,
-            "proof": self.proven and self.proven.document(self.best.field.energy(2).total),
+            "proof": self.proof,
             "methods": [self.facts(candidate) for candidate in self.candidates],
             "surface": self.surface
             and surface_facts(self.surface) | {"picture": SHADED if self.shaded else None},
             "seconds": self.seconds,
-            "stages": self.stages,
             "failures": self.failures,
             "interrupted": self.interrupted or None,
             "files": self.files,
@@ -125,20 +142,3 @@ class Report:
                 m.formulation: m.document["refused"] for m in self.manifests if m.document["refused"]
             },
         }
-
-
-@dataclass
-class Stopwatch:
-    """The seconds of consecutive stages, to 3 decimals: their sum is the whole time until the last lap."""
-
-    clock: Clock = time.perf_counter
-    stages: dict[str, float] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        """Begin the first stage."""
-        self._begin = self.clock()
-
-    def lap(self, stage: str) -> None:
-        """End a stage and begin the next one; the rounding error goes to the next one too."""
-        passed = self.clock() - self._begin - sum(self.stages.values())
-        self.stages[stage] = round(self.stages.get(stage, 0.0) + max(passed, 0.0), 3)

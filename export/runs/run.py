@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import json
 import shutil
+import time
 from collections.abc import Callable
 from concurrent.futures import Executor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from ...models.errors import CrossfieldError, SolverError
 from ...models.field.field import CrossField
 from ...models.field.file import SAME, earlier_field, write_field
-from ...models.formulations.catalogue import list_formulations
-from ...models.instance.grid import Grid
+from ...models.formulations.choice import list_formulations
 from ...models.instance.instance import Instance
 from ...models.instance.mesh import Mesh
 from ...models.processes.child import Child, KilledError
@@ -27,7 +27,7 @@ from ...models.processes.limits import Limits
 from ...models.processes.process_groups import catch_interrupts
 from ...models.processes.process_pool import process_pool
 from ...models.search.starts import first_field
-from ...models.storage import NewResults, make_folder, replace_results, write_bytes
+from ...models.storage import NewResults, replace_results, write_bytes
 from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
 from ...models.written_files import is_unchanged
@@ -37,10 +37,10 @@ from ..pictures.draw import ON_MESHES, draw, draw_layers
 from ..pictures.mask import has_mask, write_mask
 from ..pictures.underlay import Underlay, read_underlay
 from ..surfaces.files import NORMALS, SHADED, write_layers
-from .methods import METHODS, Candidate, Method, Request, methods_of
+from .methods import METHODS, Candidate, Method, Request, methods_of, time_candidate
 from .page import PAGE, REPORT, write_page
-from .proven import ProvenBound
-from .report import KEPT, Report, Stopwatch
+from .proven import certify
+from .report import CERTIFICATE, KEPT, Report
 
 PICTURES: Final = ("overview", "field", "crosses", "angle", "instance")
 OVERLAY: Final = ("overlay.svg", "overlay.png")
@@ -51,26 +51,22 @@ MASK: Final = "mask.png"
 FIELD: Final = "field.npz"
 LOWEST: Final = "lowest.npz"
 """The field of least 2-norm energy."""
-CERTIFICATE: Final = "certificate.npz"
 START: Final = "start"
 """Name of the field from which the methods of a run start: `first_field`, or the given one."""
 EARLIER: Final = "earlier run"
 """Name of a better field that an earlier run in the same folder has found."""
 COMPILING: Final = "compiling"
-WAITING: Final = "waiting"
-"""Stage in which a run waits for the methods and pictures that are computed during search and proof."""
 
 
 def plan_sentence(limits: Limits, instance: Instance) -> str:
     """A sentence on the time limit of a run's searches, in all and each, and on what has no limit."""
-    timed, in_parallel = [method for method in methods_of(instance) if method.timed], _has_processors(limits)
-    one_by_one = sum(not (method.in_parallel and in_parallel) for method in timed)
-    limits_of_methods = ", ".join(
-        f"{method.name} {limits.time_limit:g}{' in parallel' * (method.in_parallel and in_parallel)}"
-        for method in sorted(timed, key=lambda method: method.in_parallel)
+    timed = [method for method in methods_of(instance) if method.timed]
+    one_by_one = sum(not (method.in_parallel and _has_processors(limits)) for method in timed)
+    names, limit = ", ".join(method.name for method in timed), limits.time_limit
+    return (
+        f"searches take at most {one_by_one * limit:g} s ({names}: {limit:g} s each); "
+        "compiling, files and pictures take more"
     )
-    total = f"{one_by_one * limits.time_limit:g} s"
-    return f"searches take at most {total} ({limits_of_methods}); compiling, files and pictures take more"
 
 
 def run(
@@ -104,8 +100,8 @@ def run(
 
     All files appear together at the end; until then those of an earlier run stay, also when it is killed. For
     the same instance, an earlier field of less energy and an earlier certificate of a higher bound count as
-    results of this run. If a run is interrupted, earlier pictures of the same field stay. If it has less than
-    an earlier run with another field, all its files go to a folder DIR/new-results.
+    results of this run. If a run is interrupted and has fewer files than an earlier one, all of them go to a
+    folder DIR/new-results.
 
     Orthogonal crosses, and instances on meshes, get the methods that find such fields. On a mesh there are
     two pictures, `instance` and `crosses`, and the page turns the model.
@@ -164,7 +160,8 @@ def run(
             new.kept.add(MASK)
         elif has_mask(instance):
             write_mask(instance, new.path / MASK)
-        has_all = not report.interrupted or _take_over(new, names)
+        lacking = [name for name in names if not (new.path / name).exists()]
+        has_all = not report.interrupted or not any(is_unchanged(folder / name) for name in lacking)
         _write_report(report, new.path)
         return report.moved_to(folder if has_all else new.set_aside())
 
@@ -194,62 +191,43 @@ def _find_and_draw(
 
     with_earlier: whether better results of an earlier run count.
     """
-    instance, progress, should_stop, watch = request.instance, request.progress, request.stop, Stopwatch()
+    begin = time.perf_counter()
+    instance, progress, should_stop = request.instance, request.progress, request.stop
     with _open_parallel_thread(request.limits) as parallel_thread, ExitStack() as stack:
         with _compiling_in_background(instance):
             progress("greedy field")
-            start = first_field(instance)
-            watch.lap(START)
+            start = time_candidate(START, lambda: first_field(instance))
             manifests = write_all(
-                instance, new.path / "models", start=start, progress=lambda name: progress(f"writing {name}")
+                instance,
+                new.path / "models",
+                start=start.field,
+                progress=lambda name: progress(f"writing {name}"),
             )
-            watch.lap("models")
-            results = _Results([Candidate(START, start, watch.stages[START])])
-            request = replace(request, start=start)
-            _find_fields(results, request, lambda method: not method.timed, watch)
+            results = _Results([start])
+            request = replace(request, start=start.field)
+            _find_fields(results, request, lambda method: not method.timed)
             pressed = stack.enter_context(catch_interrupts())
             request = replace(request, stop=lambda: should_stop() or pressed())
-            work = (request, new.path, underlay, results.kept_field, results.interrupted)
+            kept = next((found.field for found in results.candidates if found.method == KEPT), None)
+            work = (request, new.path, underlay, kept, results.interrupted)
             parallel_work = parallel_thread.submit(_work_in_parallel, *work)
             results.interrupted = results.interrupted or _compile_functions(request)
-            watch.lap(COMPILING)
         if not request.stop():
-            _find_fields(results, request, lambda method: method.timed and not method.in_parallel, watch)
-        others, pictures = parallel_work.result()
-        results.add(others)
-        watch.lap(WAITING)
+            _find_fields(results, request, lambda method: method.timed and not method.in_parallel)
+        results.add(parallel_work.result())
         if with_earlier:
             results.add_earlier(earlier_field(new.folder / LOWEST, instance))
-        report = Report(instance, results.ranked, tuple(manifests), results.failures, results.interrupted)
-        _write_fields(report, new.path)
-        watch.lap("fields")
-        report = _write_certificate(report, new, with_earlier=with_earlier)
-        watch.lap("certificate")
-        if pictures is None:
-            pictures = _Pictures(report.kept.field, underlay, request, report.interrupted).draw_all(new.path)
-            watch.lap("pictures")
+        report = Report(instance, results.ranked, tuple(manifests), results.failures)
+        for name in (FIELD, "field.json", "field.rawfield"):
+            write_field(report.kept.field, new.path / name)
+        write_field(report.best.field, new.path / LOWEST)
+        bound = _write_certificate(results, new, with_earlier=with_earlier)
+        if kept is None:
+            draw_pictures(results, report.kept.field, underlay, request, new.path)
+    seconds = round(time.perf_counter() - begin, 3)
     return replace(
-        report,
-        surface=pictures.surface,
-        failures=report.failures | pictures.failures,
-        interrupted=report.interrupted or pictures.interrupted,
-        stages=watch.stages,
+        report, bound=bound, surface=results.surface, interrupted=results.interrupted, seconds=seconds
     )
-
-
-def _take_over(new: NewResults, names: list[str]) -> bool:
-    """Copy what an interrupted run lacks from an earlier run with the same field.
-
-    Returns whether the new files are then no fewer than the earlier ones.
-    """
-    lacking = [name for name in names if not (new.path / name).exists() and is_unchanged(new.folder / name)]
-    earlier = new.folder / FIELD
-    if not (is_unchanged(earlier) and earlier.read_bytes() == (new.path / FIELD).read_bytes()):
-        return not lacking
-    for name in lacking:
-        make_folder((new.path / name).parent)
-        shutil.copyfile(new.folder / name, new.path / name)
-    return True
 
 
 def _open_parallel_thread(limits: Limits) -> AbstractContextManager[Executor]:
@@ -264,49 +242,39 @@ def _has_processors(limits: Limits) -> bool:
 
 def _work_in_parallel(
     request: Request, folder: Path, underlay: Underlay | None, kept: CrossField | None, interrupted: str
-) -> tuple[_Results, _Pictures | None]:
+) -> _Results:
     """Find the fields of methods that occupy one processor, and draw the kept field if it is known.
 
     interrupted: what was interrupted before, so that nothing is done any more.
     """
     results = _Results(interrupted=interrupted)
     _find_fields(results, request, lambda method: method.in_parallel)
-    if kept is None:
-        return results, None
-    return results, _Pictures(kept, underlay, request, results.interrupted).draw_all(folder)
-
-
-def _write_fields(report: Report, folder: Path) -> None:
-    """Write the kept field and the lowest one."""
-    for name in (FIELD, "field.json", "field.rawfield"):
-        write_field(report.kept.field, folder / name)
-    write_field(report.best.field, folder / LOWEST)
+    if kept is not None:
+        draw_pictures(results, kept, underlay, request, folder)
+    return results
 
 
 @dataclass
 class _Results:
-    """The fields found so far, the reasons of methods that failed, and the method that Ctrl-C ended."""
+    """Fields so far, the surface over the kept one, reasons of what failed, and what Ctrl-C ended first."""
 
     candidates: list[Candidate] = field(default_factory=list)
     failures: dict[str, str] = field(default_factory=dict)
     interrupted: str = ""
+    surface: Surface | None = None
 
     def add(self, others: _Results) -> None:
         """Add what another thread found; what was interrupted first here counts."""
         self.candidates += others.candidates
         self.failures |= others.failures
         self.interrupted = self.interrupted or others.interrupted
+        self.surface = others.surface
 
     def add_earlier(self, field: CrossField | None) -> None:
         """Add the field of an earlier run, if it is better than all that were found."""
         least = min(candidate.field.energy().total for candidate in self.candidates)
         if field is not None and field.energy().total < least - SAME * (1 + least):
             self.candidates.append(Candidate(EARLIER, field, 0.0))
-
-    @property
-    def kept_field(self) -> CrossField | None:
-        """The field that is kept whatever else is found; None if that is still open."""
-        return next((found.field for found in self.candidates if found.method == KEPT), None)
 
     @property
     def ranked(self) -> tuple[Candidate, ...]:
@@ -341,13 +309,8 @@ def _compile_functions(request: Request) -> str:
     return ""
 
 
-def _find_fields(
-    results: _Results,
-    request: Request,
-    is_chosen: Callable[[Method], bool],
-    watch: Stopwatch | None = None,
-) -> None:
-    """Add the fields that some methods find, until one is interrupted; the watch has a lap for each."""
+def _find_fields(results: _Results, request: Request, is_chosen: Callable[[Method], bool]) -> None:
+    """Add the fields that some methods find, until one is interrupted."""
     for method in methods_of(request.instance):
         if results.interrupted:
             break
@@ -363,88 +326,65 @@ def _find_fields(
             results.interrupted = method.name
         if request.stop():
             results.interrupted = results.interrupted or method.name
-        if watch is not None:
-            watch.lap(method.name)
 
 
-def _write_certificate(report: Report, new: NewResults, *, with_earlier: bool) -> Report:
-    """Write the certificate of the proven bound; return the report with the bound, a failure or Ctrl-C.
+def _write_certificate(results: _Results, new: NewResults, *, with_earlier: bool) -> float | None:
+    """Write the certificate of the proven bound and return the bound, None without one.
 
     with_earlier: whether a certificate of an earlier run with a higher bound counts.
     """
     from ...models.proof.certificate import earlier_bound  # it loads Numba
 
-    proof = next((candidate.proof for candidate in report.candidates if candidate.proof is not None), None)
-    path = new.path / CERTIFICATE
+    bound, path, earlier = None, new.path / CERTIFICATE, new.folder / CERTIFICATE
     try:
-        if proof is not None:
-            report = replace(report, proven=ProvenBound.write(proof, path))
+        proof = next((found.proof for found in results.candidates if found.proof is not None), None)
+        bound = None if proof is None else certify(proof, path).bound
     except CrossfieldError as error:
-        report.failures["certificate"] = str(error)
+        results.failures["certificate"] = str(error)
     except KeyboardInterrupt:
-        report = replace(report, interrupted="certificate")
-    earlier = earlier_bound(new.folder / CERTIFICATE, report.instance) if with_earlier else None
-    if earlier is not None and (report.proven is None or earlier > report.proven.bound):
-        shutil.copyfile(new.folder / CERTIFICATE, path)
-        report = replace(report, proven=ProvenBound(earlier, path))
-    return report
+        results.interrupted = "certificate"
+    known = earlier_bound(earlier, results.candidates[0].field.instance) if with_earlier else None
+    if known is None or (bound is not None and known <= bound):
+        return bound
+    shutil.copyfile(earlier, path)
+    return known
 
 
-@dataclass
-class _Pictures:
-    """Pictures of the kept field and its surface, drawn in a child process.
+def draw_pictures(
+    results: _Results, kept: CrossField, underlay: Underlay | None, request: Request, folder: Path
+) -> None:
+    """Draw the kept field and its surface until Ctrl-C or the caller ends that; not after an interruption.
 
-    In this process they would hold up the other thread, because Python runs one of them at a time.
-
-    failures: reasons by name of what is missing. interrupted: `drawing` or `surface` if
-    Ctrl-C or the caller ended that; before, what they ended earlier, so that nothing is drawn.
+    A child process draws. Here it would hold up the other thread, because Python runs one of them at a time.
     """
-
-    kept: CrossField
-    underlay: Underlay | None
-    request: Request
-    interrupted: str
-    surface: Surface | None = None
-    failures: dict[str, str] = field(default_factory=dict)
-
-    def draw_all(self, folder: Path) -> _Pictures:
-        """Draw the field and its surface, unless the run was interrupted; return itself."""
-        if self.interrupted:
-            return self
-        with replace_results(folder, ()) as new, Child() as child:
-            try:
-                self._draw_field(child, new.path)
-                if not self.interrupted and isinstance(self.kept.instance.domain, Grid):
-                    self._draw_surface(child, new.path)
-            except KeyboardInterrupt:
-                self.interrupted = "drawing"
-        return self
-
-    def _draw_field(self, child: Child, folder: Path) -> None:
-        """Draw the field, until Ctrl-C or the caller ends that."""
-        on_mesh = isinstance(self.kept.instance.domain, Mesh)
-        for kind in ON_MESHES if on_mesh else PICTURES:
-            if self.request.stop():
-                break
-            self.request.progress(f"drawing {kind}")
-            subject = self.kept.instance if kind == "instance" else self.kept
-            child.call(partial(draw, kind=kind), subject, folder / picture_name(kind))
-        if not (on_mesh or self.request.stop()):
-            self.request.progress("drawing overlay")
-            child.call(draw_layers, self.kept, [folder / name for name in OVERLAY], self.underlay)
-        self.interrupted = "drawing" if self.request.stop() else ""
-
-    def _draw_surface(self, child: Child, folder: Path) -> None:
-        """Lift the field to a surface, and draw it if nothing speaks against it."""
-        self.request.progress("surface over the kept field")
-        work = (lift_and_draw, self.kept, folder, self.underlay)
+    if results.interrupted:
+        return
+    on_mesh = isinstance(kept.instance.domain, Mesh)
+    stage, subjects = "drawing", {"instance": kept.instance}
+    with replace_results(folder, ()) as new, Child() as child:
+        calls: dict[str, tuple[Any, ...]] = {
+            kind: (partial(draw, kind=kind), subjects.get(kind, kept), new.path / picture_name(kind))
+            for kind in (ON_MESHES if on_mesh else PICTURES)
+        }
+        if not on_mesh:
+            calls["overlay"] = (draw_layers, kept, [new.path / name for name in OVERLAY], underlay)
         try:
-            self.surface, interrupted = child.call(*work, stop=self.request.stop)
-            self.interrupted = "surface" if interrupted else ""
-        except KilledError:
-            self.interrupted = "surface"
+            for kind, call in calls.items():
+                if request.stop():
+                    break
+                request.progress(f"drawing {kind}")
+                child.call(*call)
+            results.interrupted = stage if request.stop() else ""
+            if not (on_mesh or results.interrupted):
+                stage = "surface"
+                request.progress("surface over the kept field")
+                work = (lift_and_draw, kept, new.path, underlay)
+                results.surface, stopped = child.call(*work, stop=request.stop)
+                results.interrupted = stage if stopped else ""
+        except (KilledError, KeyboardInterrupt):
+            results.interrupted = stage
         except CrossfieldError as error:
-            self.failures["surface"] = str(error)
+            results.failures[stage] = str(error)
 
 
 def lift_and_draw(kept: CrossField, folder: Path, underlay: Underlay | None) -> Surface:

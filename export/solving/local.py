@@ -41,7 +41,7 @@ from ..bundle.manifest import add_to_manifest, file_stem, instance_file
 from ..bundle.starts import LAYOUTS, STARTS, Start, write_start
 from ..formats.registry import FORMATS, file_names, problem_in_format, write
 from ..programs.protocol import (
-    FEASIBLE,
+    FEASIBILITY,
     FailedError,
     Job,
     Outcome,
@@ -50,7 +50,8 @@ from ..programs.protocol import (
     call_program,
     part_path,
 )
-from ..solutions.solution import Solution, read_solution, with_bounds
+from ..solutions.read import read_solution, with_bounds
+from ..solutions.solution import Solution
 from ..solvers_table import BUNDLED, PROGRAMS, SOLVERS, Solver, Suitability, suitability_in_format
 from ..statuses import Status
 from ..writing.sink import save_file
@@ -324,7 +325,9 @@ class Solvers:
         entry = SOLVERS[solver]
         for stale in (files.solution, files.log, files.start):
             stale.unlink(missing_ok=True)
-        begins = _write_start_file(held, solver, start, files.start)
+        begins = None
+        if start is not None and solver in STARTS and held.integer.any():  # files of .nl and GAMS hold it
+            begins = None if write_start(held, start, files.start, solver) is None else files.start
         job = Job(
             solver,
             files.model,
@@ -368,7 +371,7 @@ class Solvers:
         if solution.status is Status.OPTIMAL_IN_GAP:
             solution = with_bounds(solution, limits.gap)
         unsolved = solution.status == Status.LIMIT_WITHOUT_POINT
-        if unsolved and point is not None and held.violation(point).worst <= FEASIBLE:
+        if unsolved and point is not None and held.violation(point).worst <= FEASIBILITY:
             solution = _write_start_as_answer(held, point, files, outcome, entry)
         return replace(
             solution,
@@ -385,20 +388,6 @@ def names_of_solve(instance: Instance, name: str, solver: str, forms: Iterable[s
     files = SolveFiles.for_model(Path(f"{stem}{FORMATS['nl'].suffix}"), solver)
     others = [instance_file(instance), f"{stem}.manifest.json", files.log.name, files.solution.name]
     return [*chain.from_iterable(models), *others]
-
-
-def _write_start_file(held: Problem, solver: str, start: CrossField | None, path: Path) -> Path | None:
-    """Write the starting point for a solver that takes it as a separate file; None for the others.
-
-    Files of .nl and GAMS hold the point themselves.
-    """
-    if start is None or solver not in STARTS or not held.integer.any():
-        return None
-    try:
-        write_start(held, start, path, solver)
-    except UnsupportedBySolverError:  # Xpress, where the problem is not convex
-        return None
-    return path
 
 
 def _outcome_of_killed(files: SolveFiles, held: Problem) -> Outcome:
@@ -453,4 +442,4 @@ def _is_start(point: Floats | None, start: Floats | None) -> bool | None:
     """Whether the answer is the start up to rounding; None without either of them."""
     if point is None or start is None:
         return None
-    return bool(np.abs(point - start).max(initial=0.0) <= FEASIBLE)
+    return bool(np.abs(point - start).max(initial=0.0) <= FEASIBILITY)

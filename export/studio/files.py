@@ -16,10 +16,11 @@ from ...models.instance.file import write_instance
 from ...models.storage import temporary_folder
 from ..bundle.problem_files import write_all
 from ..pictures.draw import draw
+from ..pictures.svg import encode_png
 from ..pictures.underlay import read_underlay
 from ..shading.colours import colour_normals
 from ..shading.raster import view_of_box
-from ..surfaces.files import encode_png, paint_surface, write_surface
+from ..surfaces.files import paint_surface, write_surface
 from .document import Document, Stroke
 from .session import compute_field, compute_surface, read_drawn
 

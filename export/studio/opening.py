@@ -5,12 +5,10 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections import Counter
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ...models.errors import InputError
 from ...models.instance.domain import Bools, Floats
@@ -20,7 +18,7 @@ from ...models.sketch.cover import Box, block_means
 from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
 from ...models.sketch.parallels import find_parallels
-from ...models.sketch.thinning import thin_shape
+from ...models.sketch.thinning import smooth_way, trace_shape
 from .document import MOST_SENT, PICTURE_SIDE, Document, Mark, digest_of, read_strokes
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
@@ -28,13 +26,6 @@ _THINNED: Final = 700  # pixels on the longer side of a picture while it is trac
 _INK: Final = 0.3
 _RED: Final = 0.5
 _QUALITY: Final = 80  # of a JPEG
-_SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
-_SHORTEST: Final = 6  # pixels of a traced line; shorter ones are burrs of the thinning
-_SHORTEST_LINK: Final = 4  # pixels of a traced line between two junctions
-_AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
-
-_Pixel = tuple[int, int]
-_Way = list[_Pixel]
 
 
 def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[str, Any]:
@@ -60,15 +51,9 @@ def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[s
     if isinstance(drawing, Bitmap):
         page, strokes = _trace_picture(drawing)
     else:
-        families = find_parallels(drawing)
-        ignored = np.isin(drawing.curve, np.concatenate([[-1], *(family.curve for family in families)]))
-        if not (drawing.line & ~ignored).any():
-            families, ignored = [], np.zeros_like(ignored)
-        page, strokes = _strokes_of_curves(drawing, ignored)
-        notes += [
-            f"{family} look like {family.kind} and are ignored; mark them otherwise to use them"
-            for family in families
-        ]
+        is_parallel, parallels = find_parallels(drawing)
+        page, strokes = _strokes_of_curves(drawing, is_parallel)
+        notes += parallels
     opened: dict[str, Any] = {
         "name": name_from_text(stem or file_name),
         "page": list(page),
@@ -123,13 +108,10 @@ def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
     rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in picture.ink.shape)
     small = block_means(picture.ink, rows, columns)
     red = block_means(picture.red * picture.ink, rows, columns) / np.maximum(small, 1e-6)
-    line = thin_shape(small * max(1.0, reduced / picture.stroke_width) > _INK)
-    ways = [np.array(way) for way in _trace_ways(line)]
-    ends = Counter(tuple(end) for way in ways for end in way[[0, -1]].tolist())
-    ways = [way for way in ways if len(way) >= _SHORTEST or _is_link(way, ends)] or ways
+    ways = trace_shape(small * max(1.0, reduced / picture.stroke_width) > _INK)
     is_red = np.array([np.median(red[tuple(way.T)]) > _RED for way in ways], dtype=bool)
     as_lines = is_red if picture.has_two_colours and is_red.any() else np.ones(len(ways), dtype=bool)
-    lines = [_smooth(way)[:, ::-1] for way in ways]
+    lines = [smooth_way(way) for way in ways]
     # Middle lines end half a pen before their ink. On the box of the ink, they are read on the same grid.
     low, high = (end(np.concatenate(lines), axis=0) for end in (np.min, np.max))
     ink = np.reshape(picture.box, (2, 2))
@@ -140,56 +122,3 @@ def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
         for line, marked in zip(lines, as_lines, strict=True)
     ]
     return (0.0, 0.0, float(picture.width), float(picture.height)), strokes
-
-
-def _is_link(way: NDArray[np.int64], ends: Counter[_Pixel]) -> bool:
-    """Whether a short way lies between two junctions, where it closes a gap."""
-    return len(way) >= _SHORTEST_LINK and all(ends[row, column] > 1 for row, column in way[[0, -1]].tolist())
-
-
-def _smooth(way: NDArray[np.int64]) -> Floats:
-    """The pixels of a way as a smooth line with the same ends, with half of its points."""
-    even = ndimage.gaussian_filter1d(way.astype(np.float64), _SMOOTH, axis=0, mode="nearest")
-    if (way[0] == way[-1]).all():
-        even = ndimage.gaussian_filter1d(way[:-1].astype(np.float64), _SMOOTH, axis=0, mode="wrap")
-        return np.concatenate([even[::2], even[:1]])
-    even[0], even[-1] = way[0], way[-1]
-    return np.concatenate([even[:-1:2], even[-1:]])
-
-
-def _trace_ways(line: Bools) -> list[_Way]:
-    """The pixels of a thinned drawing as ways from one end or junction to the next, each link once."""
-    there: set[_Pixel] = {(row, column) for row, column in np.argwhere(line).tolist()}
-    links = {pixel: _neighbours(pixel, there) for pixel in there}
-    used: set[tuple[_Pixel, _Pixel]] = set()
-
-    def walk(first: _Pixel, second: _Pixel) -> _Way:
-        way = [first, second]
-        used.update({(first, second), (second, first)})
-        while len(links[way[-1]]) == 2:
-            after = next((pixel for pixel in links[way[-1]] if (way[-1], pixel) not in used), None)
-            if after is None:
-                break
-            used.update({(way[-1], after), (after, way[-1])})
-            way.append(after)
-        return way
-
-    # Ends and junctions first; what is left are closed ways.
-    order = sorted(there, key=lambda pixel: (len(links[pixel]) == 2, pixel))
-    return [
-        walk(pixel, neighbour)
-        for pixel in order
-        for neighbour in links[pixel]
-        if (pixel, neighbour) not in used
-    ]
-
-
-def _neighbours(pixel: _Pixel, there: set[_Pixel]) -> list[_Pixel]:
-    """The neighbours of a pixel; one at a corner counts only if no neighbour at a side is next to it."""
-    row, column = pixel
-    return [
-        (row + down, column + right)
-        for down, right in _AROUND
-        if (row + down, column + right) in there
-        and not (down and right and ((row, column + right) in there or (row + down, column) in there))
-    ]

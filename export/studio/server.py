@@ -25,7 +25,7 @@ from starlette.routing import Mount, Route
 from starlette.types import ASGIApp, Receive, Scope, Send
 
 from ...models.errors import CrossfieldError, InputError, NoStrokeError, shortened
-from ...models.formulations.catalogue import list_formulations
+from ...models.formulations.choice import list_formulations
 from ...models.input_limits import MAX_BYTES
 from ...models.processes.deadline import IsOver
 from ...models.sketch.samples import SAMPLES, sample_svg

@@ -77,7 +77,6 @@ def _field_view(document: Document, drawn: DrawnInstance, field: CrossField) -> 
             "energy": field.energy(2).total,
             "singularities": count_singularities(field),
         },
-        "commands": equivalent_commands(document, drawn),
     }
 
 
@@ -138,24 +137,3 @@ def _surface_view(drawn: DrawnInstance, lifted: Surface) -> dict[str, Any]:
         "freedom": list(lifted.freedom),
         "suspects": _find_suspects(drawn, unfit[instance.stroke_index]) if unfit.mean() > UNFIT / 2 else [],
     }
-
-
-def equivalent_commands(document: Document, drawn: DrawnInstance) -> list[str]:
-    """Commands that compute the same from the downloaded instance and drawing."""
-    from .session import hints_on_mask
-
-    name, hints = document.name, hints_on_mask(document, drawn.instance)
-    angles = [
-        (h.row, h.column, round(float(np.degrees(h.slant)), 4), round(float(np.degrees(h.tilt)), 4))
-        for h in hints
-    ]
-    options = "".join(f" --hint={row},{column},{slant:g},{tilt:g}" for row, column, slant, tilt in angles)
-    flip = " --flip" if document.flip else ""
-    field = f"field/{name}.bend.field.npz"
-    return [
-        f"crossfield solve {name}.json --method bend -o field",
-        f"crossfield draw {field} --underlay {name}.svg -o {name}.layers.svg",
-        f"crossfield shade {field} --underlay {name}.svg{options}{flip} -o surface",
-        f"crossfield export {name}.json -f milp-mccormick -F mps -o files",
-        f"crossfield prove {name}.json -o proof",
-    ]

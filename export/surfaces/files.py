@@ -25,9 +25,9 @@ from ...models.surface.trust import describe_support, right_angle_deviation
 from ...models.written_files import check_targets
 from ..formats.registry import program_version
 from ..pictures.layers import strokes_sheet
-from ..pictures.svg import render_sheet
+from ..pictures.svg import encode_png, render_sheet
 from ..pictures.underlay import Underlay, read_underlay
-from ..shading.colours import UPPER_LEFT, Light, colour_normals, matcap, shade_by_light, to_eight_bit
+from ..shading.colours import UPPER_LEFT, Lamp, colour_normals, shade_by_light, to_eight_bit
 from ..shading.raster import Box, Raster, View, grid_box, raster, view_of_box
 from .outline import find_outline
 
@@ -39,7 +39,6 @@ REPORT: Final = "surface.json"
 FILES: Final = {
     NORMALS: "normals as colours, as in OpenGL: red to the right, green up",
     SHADED: "in the light of a lamp",
-    "matcap.png": "in the material of a glazed ball",
     "overlay.png": "in the light of a lamp, with the strokes",
     "heights.npy": "heights at the corners of pixels",
     "surface.obj": "mesh with texture coordinates and normals",
@@ -55,10 +54,7 @@ _ENCODING: Final = (
     "red, green, blue = round(255 (n + 1) / 2) of the unit normal n: red to the right, green up (OpenGL; for "
     "DirectX invert green), blue towards the viewer; numbers, not colours, so no colour profile applies"
 )
-_BAND: Final = 1 << 20  # pixels of a picture whose normals are computed together
-_CACHED: Final = 1 << 16  # pixels whose colours are: what they need fits into the processor's cache
-_COMPRESSION: Final[dict[str, Any]] = {"compress_level": 1, "compress_type": 3}
-"""Of PNG files: repeated bytes alone (`Z_RLE` of zlib); other repetitions are rare in smooth colours."""
+_BAND: Final = 1 << 16  # pixels of a picture that are painted together: they fit into the processor's cache
 _RIM: Final = 4.0  # pixels beyond the outline with colours, so that programs can scale a picture
 _WALK: Final = [2, 3, 1, 0]  # corners of a pixel counter-clockwise, from the lower left
 
@@ -68,7 +64,7 @@ def write_surface(
     folder: str | Path,
     *,
     drawing: str | Path | Underlay | None = None,
-    light: Light = UPPER_LEFT,
+    light: Lamp = UPPER_LEFT,
     side: int | None = None,
     about: Mapping[str, Any] | None = None,
     force: bool = False,
@@ -87,7 +83,8 @@ def write_surface(
         File or sample from which the instance was read, for its page and strokes. None: the page that was
         stated when the instance was read, and a short line at each stroke pixel.
     light
-        Position of the lamp.
+        Direction of the lamp in radians: azimuth, counter-clockwise from the right, and elevation above the
+        plane of the drawing, 0 to pi/2; upper left by default.
     side
         Pixels on the longer side of the pictures. None: those of a drawing that is a picture, else about
         1024.
@@ -105,7 +102,7 @@ def write_surface(
     Raises
     ------
     InputError
-        For a drawing that is unreadable or does not match the instance, and for a side out of range.
+        For a drawing that is unreadable or does not match the instance, and for a side or lamp out of range.
     OutputError
         If a file cannot be written, or if others are in the way.
 
@@ -115,15 +112,14 @@ def write_surface(
     if drawing is not None and not isinstance(drawing, Underlay):
         drawing = read_underlay(drawing, on=surface.instance)
     view = choose_view(surface.instance, drawing, side)
-    normals, shaded, glazed = paint_surface(
-        surface, drawing, view, colour_normals, lambda part: shade_by_light(part, light), matcap
+    normals, shaded = paint_surface(
+        surface, drawing, view, colour_normals, lambda part: shade_by_light(part, light)
     )
     ink = draw_strokes(surface.instance, drawing, view)
     paper = np.full_like(ink, to_eight_bit(np.array([*_PAPER, 1.0])))
     pictures = {
         NORMALS: normals,
         SHADED: shaded,
-        "matcap.png": glazed,
         "overlay.png": lay_over(ink, shaded),
         DRAWING: lay_over(ink, paper)[..., :3],
     }
@@ -151,7 +147,7 @@ def write_layers(surface: Surface, folder: Path, drawing: Underlay | None = None
 
 
 def choose_view(instance: Instance, drawing: Underlay | None = None, side: int | None = None) -> View:
-    """The page of the drawing; the grid if there is none, or if the mask lies beside it. Raises InputError.
+    """The page of the drawing, or the grid if there is none. Raises InputError.
 
     side: pixels on the longer side; by default those of a bitmap, and SIDE for other drawings.
     """
@@ -161,17 +157,7 @@ def choose_view(instance: Instance, drawing: Underlay | None = None, side: int |
             side = round(max(drawing.page[2:]))
     else:
         page = instance.reading.page if instance.reading else None
-    return view_of_box(page if page and _is_on(page, instance) else grid_box(instance), side)
-
-
-def _is_on(page: Box, instance: Instance) -> bool:
-    """Whether the middle of a pixel of the mask lies on a page."""
-    x, y, width, height = page
-    across, down = (
-        start + instance.pixel_size * (steps + 0.5)
-        for start, steps in zip(instance.origin, (instance.grid.columns, instance.grid.rows), strict=True)
-    )
-    return bool(((across >= x) & (across < x + width) & (down >= y) & (down < y + height)).any())
+    return view_of_box(page or grid_box(instance), side)
 
 
 def paint_surface(
@@ -187,22 +173,11 @@ def paint_surface(
     for top in range(0, view.height, band):
         rows = slice(top, top + band)
         part = raster(surface.instance, surface.normals, view, rows, outline)
-        near = np.flatnonzero(part.depth > -_RIM)
-        normals, depth = part.normals.reshape(-1, 3), part.depth.ravel()
-        for pixels in np.array_split(near, 1 + len(near) // _CACHED):
-            seen = Raster(normals[pixels], depth[pixels])
-            for picture, colour in zip(pictures, colours, strict=True):
-                picture[rows].reshape(-1, 4)[pixels] = to_eight_bit(colour(seen))
+        near = part.depth > -_RIM
+        seen = Raster(part.normals[near], part.depth[near])
+        for picture, colour in zip(pictures, colours, strict=True):
+            picture[rows][near] = to_eight_bit(colour(seen))
     return pictures
-
-
-def encode_png(picture: NDArray[np.uint8]) -> bytes:
-    """A picture (h, w, 3 or 4) of red, green, blue and optional opacity as PNG."""
-    from PIL import Image
-
-    stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, "PNG", **_COMPRESSION)
-    return stream.getvalue()
 
 
 def lay_over(above: NDArray[np.uint8], below: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -24,7 +24,6 @@ _MARGIN: Final = 0.25  # of the longer side of the grid round it, so that the pa
 _WIDTH: Final = 0.25  # pixels of the grid that strokes are wide there: smaller gaps are closed
 _LEAST: Final = 2.0  # pixels of that picture that strokes are wide, so that they have no gaps
 _FULL: Final = 0.6  # least share of a cell near the mask that makes it inside
-_FINE: Final = 6.0  # places along a pixel of the grid, at least, whose distances from the mask are computed
 _BLUR: Final = 2.0  # pixels of that picture over which the outline is smoothed
 _DEEP: Final = 1.0  # pixels of the grid from the border of the mask: a cell with none so deep is outside
 _NEAR: Final = 1.5  # pixels of the grid from the mask
@@ -42,9 +41,7 @@ def find_outline(instance: Instance, drawing: Underlay) -> Outline:
     ink = render_sheet(sheet, view.width, view.height)[..., 3] > 127
     mask = depth_inside(instance, view) > 0
     side = np.array(view.pixel[::-1]) / instance.pixel_size
-    step = max(1, int(1 / (_FINE * side.max())))
-    rough, at = mask[::step, ::step], np.ix_(*(np.arange(length) // step for length in mask.shape))
-    away, depth = (ndimage.distance_transform_edt(area, step * side)[at] for area in (~rough, rough))
+    away, depth = (ndimage.distance_transform_edt(area, side) for area in (~mask, mask))
     cells, count = ndimage.label(~ink)
     size, near, deep = (
         np.bincount(cells[area], minlength=count + 1) for area in (cells >= 0, away <= _NEAR, depth > _DEEP)

@@ -29,10 +29,9 @@ class Check:
     """A check of a file with a program: reading it, or solving it with one of its solvers.
 
     problem: instance and formulation. program: its name, or the solver's. objective: recomputed at the
-    solver's point; bound: its dual bound; energy: the objective again, with every other column at the value
-    that follows from angles and jumps; leeway: greatest reduction of the objective by the rows that the point
-    breaks. group: equal for problems with the same optimum; relaxes: the group that the file relaxes, whose
-    optimum is at least as high.
+    solver's point; bound: its dual bound; attained: an objective that a feasible point has. group: equal for
+    problems with the same optimum; relaxes: the group that the file relaxes, whose optimum is at least as
+    high.
     """
 
     problem: str
@@ -43,8 +42,7 @@ class Check:
     reason: str = ""
     objective: float | None = None
     bound: float | None = None
-    energy: float | None = None
-    leeway: float | None = None
+    attained: float | None = None
     seconds: float | None = None
     proven: bool = False
     group: str = ""

@@ -15,9 +15,10 @@ from typing import Final, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.formulations.families import Block, Coefficient, Monomial, row_sides
+from ...models.formulations.families import Block, Coefficient, Monomial
 from ...models.formulations.problem import Problem
 from ...models.instance.domain import Bools, Floats, Ints
+from .mod_order import mod_column_order
 from .names import Names
 from .nl_order import NlOrder
 from .records import TaggedWords, Texts, check_coefficients, texts_of_bytes
@@ -73,11 +74,6 @@ class CanonicalForm:
         """
         return one_column_name(self.problem.stamp)
 
-    @property
-    def column_count(self) -> int:
-        """Number of columns of LP and MPS."""
-        return self.problem.n_columns + 1
-
     @cached_property
     def costs(self) -> Floats:
         """Cost of every column (columns,). Raises UnsupportedByFormatError for an extreme one."""
@@ -124,20 +120,6 @@ class CanonicalForm:
                 yield BlockBounds(kind, names.at(at), block.lower[at], block.upper[at])
 
     @cached_property
-    def row_lower(self) -> Floats:
-        """Left sides of all rows, constants moved there, -inf without one, shape (rows,)."""
-        return self._sides[0]
-
-    @cached_property
-    def row_upper(self) -> Floats:
-        """Right sides of all rows, inf without one, shape (rows,)."""
-        return self._sides[1]
-
-    @cached_property
-    def _sides(self) -> tuple[Floats, Floats]:
-        return row_sides(self.problem.rows)
-
-    @cached_property
     def nl_order(self) -> NlOrder:
         """Order of columns and rows in the .nl file."""
         return NlOrder(self.problem)
@@ -147,41 +129,13 @@ class CanonicalForm:
         if file == "nl":
             return self.nl_order.order
         if file == "mod":
-            return _glpk_column_order(self.problem)
+            return mod_column_order(self.problem)
         columns, one = np.arange(self.problem.n_columns, dtype=np.int32), [self.problem.n_columns]
         return np.concatenate([one, columns] if file == "lp" else [columns, one]).astype(np.int32)
 
     def row_count(self, file: ColumnOrder) -> int:
         """Number of rows in a file: LP and MPS have at least one, and GLPK counts the objective of a .mod."""
         return self.problem.n_rows + {"nl": 0, "mod": 1}.get(file, not self.problem.rows)
-
-
-def _glpk_column_order(problem: Problem) -> Ints:
-    """Columns (k,) in the order in which GLPK 5.0 numbers those of our .mod, without an angle in no row.
-
-    It numbers the columns of a block as they first occur. Every pair names its second pixel before its first
-    one: (14) and (16) have both on the right side, and GLPK adds from the back. Then the strokes follow, and
-    for the skew all pixels. `glpsol -m x.mod -d x.dat --wglp` names the columns that it numbers.
-    """
-    instance = problem.instance
-    domain = instance.domain
-    named = np.concatenate([np.stack([domain.second, domain.first], axis=1).ravel(), instance.stroke_index])
-    orders = {
-        "alpha": _first_occurrences(named),
-        "beta": _first_occurrences(np.concatenate([named, np.arange(domain.size)])),
-    }
-    return np.concatenate(
-        [
-            block.offset + orders.get(name, np.arange(block.count, dtype=np.int64))
-            for name, block in problem.blocks.items()
-        ]
-    ).astype(np.int32)
-
-
-def _first_occurrences(indices: Ints) -> Ints:
-    """Every number once, in the order of first occurrence."""
-    numbers, places = np.unique(indices, return_index=True)
-    return numbers[np.argsort(places)]
 
 
 def bound_kinds(block: Block) -> NDArray[np.int8]:

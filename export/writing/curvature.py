@@ -2,16 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Final
-
 import numpy as np
 
-from ...models.formulations.families import PlacedFamily
 from ...models.formulations.problem import Problem
 from .canonical import CanonicalForm
-
-NEGLIGIBLE: Final = 1e-9
-"""Eigenvalues this small relative to the largest count as zero."""
 
 
 def objective_curvature(problem: Problem) -> tuple[str, str]:
@@ -22,7 +16,7 @@ def objective_curvature(problem: Problem) -> tuple[str, str]:
     if degree > 2:
         kind = "a cosine of integers" if degree == 99 else f"products of p1 and skews, degree {degree}"
         return "nonconvex", f"the objective holds {kind}: its Hessian is not constant"
-    if all(_is_convex(family) for family in problem.objective):
+    if problem.formulation.has_convex_objective:
         return (
             "convex",
             "a sum of squares of linear expressions with positive weights: no eigenvalue is negative",
@@ -30,43 +24,20 @@ def objective_curvature(problem: Problem) -> tuple[str, str]:
     return "indefinite", "the objective holds products that are no squares"
 
 
-def _is_convex(family: PlacedFamily) -> bool:
-    """Whether each summand of a quadratic family has a Hessian without negative eigenvalue."""
-    products = family.of_degree(2)
-    if not products:
-        return True
-    values = np.stack([np.broadcast_to(term.coefficient, (family.count,)) for term in products], axis=1)
-    values = values[:1] if (values == values[0]).all() else values
-    hessian = np.zeros((len(values), len(family.variables), len(family.variables)))
-    for term, value in zip(products, values.T, strict=True):
-        first, second = map(family.variables.index, term.symbols)
-        hessian[:, first, second] += value
-        hessian[:, second, first] += value
-    eigenvalues = np.linalg.eigvalsh(hessian)
-    return bool((eigenvalues[:, 0] >= -NEGLIGIBLE * np.maximum(eigenvalues[:, -1], 0.0)).all())
-
-
 def row_curvature(problem: Problem) -> str:
-    """Curvature of the rows: none, linear, convex, indefinite or nonconvex."""
+    """Curvature of the rows: none, linear, indefinite or nonconvex; no declaration has convex ones."""
     if not problem.rows:
         return "none"
     if problem.row_degree <= 1:
         return "linear"
-    curved = [family for family in problem.rows if family.degree > 1]
-    if problem.row_degree > 2:
-        return "nonconvex"
-    return (
-        "convex"
-        if all(family.family.sense == "<=" and _is_convex(family) for family in curved)
-        else "indefinite"
-    )
+    return "nonconvex" if problem.row_degree > 2 else "indefinite"
 
 
 def probtype(problem: Problem) -> str | None:
     """QPLIB's three letters, of objective, variables and constraints; None beyond quadratic problems.
 
     L linear, D convex and diagonal, C convex, Q any; C continuous, B binary, M with binaries, I integer, G
-    with integers; N none, B bounds, L linear, C convex, Q any.
+    with integers; N none, B bounds, L linear, Q any.
     """
     if max(problem.objective_degree, problem.row_degree) > 2:
         return None
@@ -92,5 +63,5 @@ def _variables_letter(problem: Problem) -> str:
 
 def _constraints_letter(problem: Problem) -> str:
     bounded = bool(np.isfinite(problem.lower).any() or np.isfinite(problem.upper).any())
-    kinds = {"none": "B" if bounded else "N", "linear": "L", "convex": "C"}
+    kinds = {"none": "B" if bounded else "N", "linear": "L"}
     return kinds.get(row_curvature(problem), "Q")

@@ -5,9 +5,11 @@ from __future__ import annotations
 from functools import cached_property
 from typing import Any, Final
 
+import numpy as np
+
 from ...models.formulations.expressions import Symbol
 from ...models.formulations.families import Block, PlacedFamily
-from ...models.formulations.names import column_names, element_names
+from ...models.formulations.names import column_names, element_names, stack_names
 from ...models.formulations.problem import Problem
 from ...models.formulations.symbols import IndexSet
 from .records import TaggedWords, Words
@@ -57,6 +59,14 @@ class Names:
         if over not in self._places:
             self._places[over] = Words(element_names(self._problem.instance, "", over), None)
         return self._places[over]
+
+    @cached_property
+    def places(self) -> tuple[Words, dict[IndexSet, int]]:
+        """An empty word and all positions of rows, and where those of each index set begin."""
+        sets = list(dict.fromkeys(family.family.over for family in self._problem.rows))
+        tables = [np.zeros((1, 1), np.uint8), *(self._of(over).table for over in sets)]
+        begins = np.cumsum([len(table) for table in tables]).tolist()
+        return Words(stack_names(tables), None), dict(zip(sets, begins, strict=False))
 
     @cached_property
     def all(self) -> Words:

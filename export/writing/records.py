@@ -1,10 +1,10 @@
 """Blocks of equal records as bytes: one template, holes filled by NumPy, no Python per record.
 
 A record is a list of parts: literal bytes, words from a table (names, numbers) or decimal integers. A block
-of records is a matrix of bytes, one row per record. Literals are laid out once; a hole is filled for all
-records of the block by one strided copy of whole words. Words of different length in a block are
-padded with NUL, and the padding is dropped in one step. Names of one family all have one length, so most
-blocks have none. Memory is one block for any number of records.
+of records is a structured array with a field for each part, which is filled for all records by one strided
+copy of whole words. Words of different length in a block are padded with NUL, and the padding is dropped in
+one step. Names of one family all have one length, so most blocks have none. Memory is one block for any
+number of records.
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import accumulate
 from typing import Any, Final, Protocol
 
 import numpy as np
@@ -20,7 +19,7 @@ from numpy.typing import NDArray
 
 from ...models.errors import UnsupportedByFormatError
 from ...models.formulations.names import Bytes, digits
-from ...models.instance.domain import Bools, Floats
+from ...models.instance.domain import Floats
 
 Cells = NDArray[Any]
 """Words of equal length, one item each."""
@@ -28,14 +27,10 @@ Texts = NDArray[np.bytes_]
 
 BLOCK: Final = 8192
 """Records per block: their bytes stay in the processor's cache."""
-_BITS: Final = 16  # optional pieces whose patterns are numbered without renumbering
 
 LEAST_COEFFICIENT: Final = 1e-9
 COEFFICIENT_LIMIT: Final = 1e15
 """Readers drop or refuse coefficients outside (LEAST, MOST): docs/format-rules.md, W5 and M23."""
-
-_FEW: Final = 100
-"""Whole numbers within so small a range are numbered without sorting."""
 
 
 class Hole(Protocol):
@@ -101,22 +96,6 @@ class Decimals:
 
 
 @dataclass(frozen=True, eq=False)
-class RawValues:
-    """Values as little-endian bytes, one per record: for binary files."""
-
-    values: NDArray[Any]
-
-    @property
-    def width(self) -> int:
-        """Bytes of one value."""
-        return int(self.values.dtype.itemsize)
-
-    def cells(self, start: int, stop: int) -> tuple[Cells, bool]:
-        """These values."""
-        return self.values[start:stop], False
-
-
-@dataclass(frozen=True, eq=False)
 class TaggedWords:
     """Words after a tag that all records share: names of one family."""
 
@@ -137,120 +116,25 @@ Piece = bytes | Hole | TaggedWords
 Pieces = Sequence[Piece]
 
 
-@dataclass(frozen=True, eq=False)
-class OptionalPieces:
-    """Pieces that only some records have."""
-
-    present: Bools
-    pieces: Pieces
-
-
-def render(parts: Sequence[Piece | OptionalPieces], count: int, *, padded: bool = True) -> Iterator[bytes]:
-    """The bytes of `count` records, block by block. padded: drop NUL bytes (never for binary records)."""
-    if count == 0 or not parts:
-        return
-    template = _Template(parts)
-    for start in range(0, count, BLOCK):
-        line, gaps = template.line(start, min(start + BLOCK, count))
-        yield line[line != 0].tobytes() if padded and gaps else line.tobytes()
-
-
-class _Template:
-    """The pieces of a record and the bytes of the present block: literals stay, holes are filled again.
-
-    A hole is as wide as the words of its block need, so the matrix is laid out again when a width changes,
-    which is rare.
-    """
-
-    def __init__(self, parts: Sequence[Piece | OptionalPieces]) -> None:
-        self._pieces: list[bytes | Hole] = []
-        self._optional: list[tuple[slice, Bools]] = []
-        for part in parts:
-            first = len(self._pieces)
-            for piece in part.pieces if isinstance(part, OptionalPieces) else (part,):
-                self._pieces += [piece.tag, piece.words] if isinstance(piece, TaggedWords) else [piece]
-            if isinstance(part, OptionalPieces):
-                self._optional.append((slice(first, len(self._pieces)), part.present))
-        self._parts = {id(piece): piece for piece in self._pieces if not isinstance(piece, bytes)}
-        self._widths: list[int] = []
-
-    def line(self, start: int, stop: int) -> tuple[Bytes, bool]:
-        """The bytes of these records in a row, and whether there are NUL bytes to drop."""
-        cells, padded = {}, False
-        for key, part in self._parts.items():
-            cells[key], gaps = part.cells(start, stop)
-            padded |= gaps
-        self._lay_out(cells, stop - start)
-        for hole, key in self._holes:
-            hole[: stop - start] = cells[key]
-        present = [where[start:stop] for _, where in self._optional]
-        if all(where.all() for where in present):
-            return self._matrix[: stop - start].reshape(-1), padded
-        return self._chosen(present), padded
-
-    def _lay_out(self, cells: dict[int, Cells], rows: int) -> None:
-        """Set literals and the positions of holes after a width has changed."""
-        widths = [
-            len(piece) if isinstance(piece, bytes) else cells[id(piece)].dtype.itemsize
-            for piece in self._pieces
-        ]
-        if widths == self._widths:
-            return
-        self._widths, self._ends = widths, [0, *accumulate(widths)]
-        texts = (
-            piece if isinstance(piece, bytes) else bytes(width)
-            for piece, width in zip(self._pieces, widths, strict=True)
-        )
-        self._matrix = np.tile(np.frombuffer(b"".join(texts), dtype=np.uint8), (rows, 1))
-        self._holes = [
-            (self._column(first, cells[id(piece)].dtype), id(piece))
-            for first, piece in zip(self._ends, self._pieces, strict=False)
-            if not isinstance(piece, bytes)
-        ]
-
-    def _column(self, first: int, kind: Any) -> Cells:
-        """The column of the matrix that begins at a byte, one item per record."""
-        return np.ndarray((len(self._matrix),), kind, self._matrix, first, (self._matrix.shape[1],))
-
-    def _chosen(self, present: Sequence[Bools]) -> Bytes:
-        """The bytes of the present records without their missing pieces.
-
-        Few patterns of presence occur: adjacent bytes of one pattern are moved for all of its
-        records at once.
-        """
-        pattern = np.zeros(len(present[0]), dtype=np.intp)
-        for number, where in enumerate(present):
-            pattern = 2 * pattern + where
-            if number >= _BITS:  # a column may be in rows of fifty kinds, as with long cycles
-                pattern = np.unique(pattern, return_inverse=True)[1]
-        there = np.bincount(pattern)
-        records = {number: np.flatnonzero(pattern == number) for number in np.flatnonzero(there).tolist()}
-        found = {
-            number: self._stretches([bool(where[at[0]]) for where in present])
-            for number, at in records.items()
-        }
-        lengths = np.zeros(len(there), dtype=np.intp)
-        lengths[list(found)] = [sum(last - first for first, last in runs) for runs in found.values()]
-        ends = np.cumsum(lengths[pattern])
-        line = np.empty(ends[-1], dtype=np.uint8)
-        for number, runs in found.items():
-            at = records[number]
-            to = ends[at] - lengths[number]
-            for first, last in runs:
-                kind = f"V{last - first}"
-                anywhere = np.ndarray((len(line) - (last - first) + 1,), kind, line, 0, (1,))
-                anywhere[to] = self._column(first, kind)[at]
-                to += last - first
-        return line
-
-    def _stretches(self, present: Sequence[bool]) -> list[tuple[int, int]]:
-        """First and last byte of adjacent pieces in a record that has these optional pieces."""
-        cuts = [0]
-        for (place, _), there in zip(self._optional, present, strict=True):
-            if not there:
-                cuts += [self._ends[place.start], self._ends[place.stop]]
-        cuts.append(self._ends[-1])
-        return [(first, last) for first, last in zip(cuts[::2], cuts[1::2], strict=True) if first < last]
+def render(parts: Pieces, count: int = 1) -> Iterator[bytes]:
+    """The bytes of `count` records, block by block; literals are filled again when a width changes."""
+    pieces: list[bytes | Hole] = []
+    for part in parts:
+        pieces += [part.tag, part.words] if isinstance(part, TaggedWords) else [part]
+    pieces = [piece for piece in pieces if not isinstance(piece, bytes) or piece]
+    records = np.empty(0, "V1")
+    for start in range(0, count if pieces else 0, BLOCK):
+        size = min(BLOCK, count - start)
+        holes = {id(hole): hole.cells(start, start + size) for hole in pieces if not isinstance(hole, bytes)}
+        cells = [np.void(piece) if isinstance(piece, bytes) else holes[id(piece)][0] for piece in pieces]
+        kind = np.dtype([(f"{place}", cell.dtype) for place, cell in enumerate(cells)])
+        is_new = records.dtype != kind
+        records = np.empty(size, kind) if is_new else records[:size]
+        for place, cell in enumerate(cells):
+            if is_new or cell.ndim:
+                records[f"{place}"] = cell
+        line = records.view(np.uint8)
+        yield (line[line != 0] if any(gaps for _, gaps in holes.values()) else line).tobytes()
 
 
 def cells_of_rows(matrix: Bytes) -> Cells:
@@ -310,18 +194,9 @@ def words(values: Floats | float, text: Callable[[Floats], Texts] = number_texts
     first = doubles.ravel()[:1]
     if len(first) and (doubles == first).all():
         return bytes(text(first)[0])
-    distinct, codes = _distinct_numbers(doubles)
-    return Words(bytes_of_texts(text(distinct)), codes)
-
-
-def _distinct_numbers(values: Floats) -> tuple[Floats, NDArray[Any]]:
-    """Ascending numbers that include all `values`, and the place of each; few whole ones are not sorted."""
-    least, most = (float(values.min()), float(values.max())) if len(values) else (0.0, -1.0)
-    few = 0 <= most - least < _FEW and max(-least, most) < COEFFICIENT_LIMIT
-    if few and (values == np.rint(values)).all():
-        return np.arange(least, most + 1), (values - least).astype(np.uint8)
-    distinct, _, codes = np.unique(values, return_index=True, return_inverse=True)
-    return distinct, codes
+    runs = np.flatnonzero(np.append(True, doubles[1:] != doubles[:-1])[: len(doubles)])
+    distinct, codes = np.unique(doubles[runs], return_inverse=True)  # families have few runs of equal numbers
+    return Words(bytes_of_texts(text(distinct)), np.repeat(codes, np.diff(runs, append=len(doubles))))
 
 
 def check_coefficients(values: Floats | float, where: str) -> None:

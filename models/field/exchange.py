@@ -2,45 +2,41 @@
 
 `.rawfield`, of Directional: a line `4 F`, then for each of F faces u, v, -u, -v as 12 numbers x y z,
 counter-clockwise. Its singularities (.sings) and its mesh (.obj) are files of their own. Other fields are
-read too: vectors of any length and order that form two pairs of opposite vectors in the plane of their face.
+read too: vectors of any length and order that form two pairs of opposite vectors. They are projected to the
+plane of their face, because programs round meshes and vectors to a few digits.
 
 `.rosy`, of QuadWild and others: the number of faces, 4, and for each face one vector of an orthogonal cross,
 in the plane of its face. A skewed cross is written as the orthogonal cross between its lines.
 
-`.ply` and `.vtk` hold the mesh too, and u and v of each face: as properties ux to vz, and as cell vectors.
-The .vtk also has the index of each vertex, 0 at most of them.
+`.ply` and `.vtk` are written for other programs. They hold the mesh too, and u and v of each face: as
+properties ux to vz, and as cell vectors. The .vtk also has the index of each vertex, 0 at most of them.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from ..errors import InstanceError, quote_line
-from ..input_limits import MAX_NUMBER
+from ..arguments import whole_numbers
+from ..errors import InputError, InstanceError, naming, quote_line
+from ..input_limits import MAX_BYTES, MAX_NUMBER
 from ..instance.domain import Floats
 from ..instance.instance import Instance
 from ..instance.mesh import Mesh
+from ..storage import read_bytes
+from ..text_rows import Lines, filled_lines, number_rows, plain_text
 from .field import CrossField
 from .triangles import field_of_vectors, mesh_of, singular_vertices, triangle_counts, vectors_of
 
-Lines = list[tuple[int, bytes]]
-"""Lines of a file and their numbers, from 1."""
-
-"""How the .obj of a mesh begins, by which it differs from the user's own mesh."""
-
 _COMPONENTS: Final = ("ux", "uy", "uz", "vx", "vy", "vz")
+_VTK_TRIANGLE: Final = "5\n"  # type of a cell
 _PER_FACE: Final = 20  # numbers about a face and its vertices in any of these files, and words of a head
 _OPPOSITE: Final = 1e-3  # radians by which the two vectors of a line may fail to be opposite
-_NEAR: Final = 1e-5  # share of the extent by which corners of a mesh may differ: numbers rounded to 6 digits
-_FLAT: Final = 1e-6  # share of a vector that may point out of the plane
-_NUMBERS: Final = re.compile(
-    rb"(?:[ \t]*+[-+]?(?:\d++(?:\.\d*+)?|\.\d++)(?:[eE][-+]?\d++)?(?![^ \t]))*+[ \t]*+"
-)
+_FLAT: Final = 0.05  # share of a vector that may point out of the plane: programs round meshes to 6 digits
 
 
 def _to_rawfield(field: CrossField) -> bytes:
@@ -99,9 +95,11 @@ def _to_vtk(field: CrossField) -> bytes:
     index[vertex, 0] = turns
     u, v = (f"VECTORS {name} double\n{_text_of_rows(vectors[:, k])}" for k, name in enumerate("uv"))
     return (
-        f"# vtk DataFile Version 3.0\ncrosses on {field.instance.name}\nASCII\nDATASET POLYDATA\n"
+        f"# vtk DataFile Version 3.0\ncrosses on {field.instance.name}\nASCII\n"
+        "DATASET UNSTRUCTURED_GRID\n"
         f"POINTS {len(mesh.vertices)} double\n{_text_of_rows(mesh.vertices)}"
-        f"POLYGONS {mesh.size} {4 * mesh.size}\n{_text_of_rows(mesh.faces, '3 ')}"
+        f"CELLS {mesh.size} {4 * mesh.size}\n{_text_of_rows(mesh.faces, '3 ')}"
+        f"CELL_TYPES {mesh.size}\n{mesh.size * _VTK_TRIANGLE}"
         f"CELL_DATA {mesh.size}\n{u}{v}"
         f"POINT_DATA {len(index)}\nSCALARS index double 1\nLOOKUP_TABLE default\n{_text_of_rows(index)}"
     ).encode()
@@ -119,88 +117,41 @@ def most_text_bytes(instance: Instance) -> int:
 
 def _parse_rawfield(data: bytes, instance: Instance) -> CrossField:
     """Read the field of a .rawfield on the instance. Raises InstanceError that names the line."""
-    head, *lines = data.splitlines() or [b""]
+    (first, head), *rows = filled_lines(plain_text(data)) or [(1, b"")]
     words = head.split()
     if len(words) != 2 or not all(word.isdigit() and len(word) < MAX_NUMBER for word in words):
-        raise InstanceError(f"line 1: is {quote_line(head)}, not the degree 4 and a number of faces")
+        raise InstanceError(f"line {first}: is {quote_line(head)}, not the degree 4 and a number of faces")
     degree, faces = map(int, words)
     if degree != 4:
-        raise InstanceError(f"line 1: has {degree} vectors per face; crosses have 4: u, v, -u, -v")
-    _check_triangles(faces, instance, "line 1: ")
-    rows = [(number, line) for number, line in enumerate(lines, 2) if line.strip()]
+        raise InstanceError(f"line {first}: has {degree} vectors per face; crosses have 4: u, v, -u, -v")
+    _check_triangles(faces, instance, f"line {first}: ")
     _check_stated(rows, faces)
-    vectors = _number_rows(rows, 12, "x y z of four vectors").reshape(-1, 4, 3)
+    vectors = number_rows(rows, 12, "x y z of four vectors", InstanceError).reshape(-1, 4, 3)
     return field_of_vectors(instance, *_pair_opposites(_unit_vectors(vectors, rows, instance), rows))
 
 
 def _parse_rosy(data: bytes, instance: Instance) -> CrossField:
     """Read the field of a .rosy on the instance. Raises InstanceError that names the line."""
-    body = [(number, line) for number, line in enumerate(data.splitlines(), 1) if line.strip()]
+    body = filled_lines(plain_text(data))
     if [line.split() for _, line in body[1:2]] != [[b"4"]]:
         raise InstanceError("line 2: is not 4, the number of directions of a cross; give a field of crosses")
-    (faces,), rows = _number_rows(body[:1], 1, "the number of faces")[0], body[2:]
+    (faces,), rows = number_rows(body[:1], 1, "the number of faces", InstanceError)[0], body[2:]
     _check_triangles(len(rows), instance)
     _check_stated(rows, faces)
-    u = _unit_vectors(_number_rows(rows, 3, "x y z of a vector")[:, None], rows, instance)[:, 0]
+    u = _unit_vectors(number_rows(rows, 3, "x y z of a vector", InstanceError)[:, None], rows, instance)[:, 0]
     normals = mesh_of(instance).normals
     return field_of_vectors(instance, u, np.cross(normals if len(normals) == len(u) else normals[::2], u))
 
 
-def _parse_ply(data: bytes, instance: Instance) -> CrossField:
-    """Read the field of a .ply that `_to_ply` wrote. Raises InstanceError that names the line."""
-    lines = data.splitlines()
-    mesh, end = mesh_of(instance), next((k for k, line in enumerate(lines) if line == b"end_header"), 0)
-    expected = [f"property double {name}".encode() for name in _COMPONENTS]
-    if lines[end - len(expected) : end] != expected:
-        raise InstanceError("its faces have no properties ux, uy, uz, vx, vy, vz; give a .ply of crossfield")
-    faces = end + 1 + len(mesh.vertices)
-    has_all = b"element vertex %d" % len(mesh.vertices) in lines[:end]
-    _check_mesh(lines, end + 1 if has_all else None, faces, instance)
-    return _field_of_rows(list(enumerate(lines[faces:], faces + 1)), 4, instance)
-
-
-def _parse_vtk(data: bytes, instance: Instance) -> CrossField:
-    """Read the field of a .vtk with cell vectors u and v. Raises InstanceError that names the line."""
-    lines, mesh = data.splitlines(), mesh_of(instance)
-    sections = {b" ".join(line.split()[:2]): k + 1 for k, line in enumerate(lines) if line[:1].isalpha()}
-    heads = [sections.get(b"VECTORS " + name, 0) for name in (b"u", b"v")]
-    if not all(heads):
-        raise InstanceError("has no cell vectors u and v as text; give a .vtk of crossfield")
-    points, faces = b"POINTS %d" % len(mesh.vertices), b"POLYGONS %d" % mesh.size
-    _check_mesh(lines, sections.get(points), sections.get(faces), instance)
-    u, v = (lines[head : head + mesh.size] for head in heads)
-    rows = [(heads[0] + 1 + k, b" ".join(pair)) for k, pair in enumerate(zip(u, v, strict=False))]
-    return _field_of_rows(rows, 0, instance)
-
-
-def _check_mesh(lines: list[bytes], points: int | None, faces: int | None, instance: Instance) -> None:
-    """Raise InstanceError unless vertices and faces from two lines of a file on are those of the instance.
-
-    points, faces: None where the file has other numbers of them.
-    """
-    mesh, other = mesh_of(instance), "holds another mesh than the instance; give the instance of this field"
-    if points is None or faces is None:
-        raise InstanceError(other)
-    rows = [*enumerate(lines[points : points + len(mesh.vertices)], points + 1)]
-    vertices = _number_rows(rows, 3, "x y z of a vertex")
-    rows = [
-        (k + 1, b" ".join(lines[k].split()[:4])) for k in range(faces, min(faces + mesh.size, len(lines)))
-    ]
-    corners = _number_rows(rows, 4, "3 and the vertices of a face")[:, 1:].astype(np.int64)
-    near = _NEAR * np.ptp(mesh.vertices, axis=0).max()
-    if (
-        corners.shape != mesh.faces.shape
-        or ((corners < 0) | (corners >= len(vertices))).any()
-        or (np.abs(vertices[corners] - mesh.vertices[mesh.faces]) > near).any()
-    ):
-        raise InstanceError(other)
-
-
-def _field_of_rows(rows: Lines, skipped: int, instance: Instance) -> CrossField:
-    """The field of rows that end with u and v, after a number of others."""
-    _check_triangles(len(rows), instance)
-    table = _number_rows(rows, skipped + 6, "the last six x y z of u and v")[:, skipped:].reshape(-1, 2, 3)
-    return field_of_vectors(instance, *_unit_vectors(table, rows, instance).swapaxes(0, 1))
+def read_sings(path: Path) -> list[list[int]]:
+    """Vertices and four times their indices in a .sings. Raises InputError that names the line."""
+    with naming(path):
+        body = filled_lines(plain_text(read_bytes(path, MAX_BYTES)))
+        numbers = number_rows(body, 2, "a vertex and four times its index (in the first line 4 and a count)")
+        if numbers[:1].tolist() != [[4, len(numbers) - 1]]:
+            raise InputError(f"does not begin with 4 {max(len(numbers) - 1, 0)}, the number of its vertices")
+        rows: list[list[int]] = whole_numbers(numbers[1:], "a row", InputError).tolist()
+        return rows
 
 
 def _check_triangles(count: int, instance: Instance, place: str = "") -> None:
@@ -218,17 +169,6 @@ def _check_stated(rows: Lines, stated: float) -> None:
         raise InstanceError(f"has {len(rows)} rows of vectors, but its first line states {stated:.15g}")
 
 
-def _number_rows(rows: Lines, width: int, meaning: str) -> Floats:
-    """The numbers (k, width) of lines. Raises InstanceError that names the line and the meaning."""
-    for number, line in rows:
-        words = len(line.split())
-        if words != width:
-            raise InstanceError(f"line {number}: has {words} numbers; give {width}, {meaning}")
-        if not _NUMBERS.fullmatch(line):
-            raise InstanceError(f"line {number}: holds something other than numbers: {quote_line(line)}")
-    return np.array(b" ".join(line for _, line in rows).split(), dtype=np.float64).reshape(-1, width)
-
-
 def _unit_vectors(vectors: Floats, rows: Lines, instance: Instance) -> Floats:
     """The vectors (k, c, 3) of faces at length 1. Raises InstanceError for one that is no direction there."""
     largest = np.abs(vectors).max(axis=2, keepdims=True)
@@ -238,8 +178,13 @@ def _unit_vectors(vectors: Floats, rows: Lines, instance: Instance) -> Floats:
     unit /= np.linalg.norm(unit, axis=2, keepdims=True)
     domain = instance.domain
     normal = domain.normals if isinstance(domain, Mesh) else np.array([[0.0, 0.0, 1.0]])
-    beyond = np.abs((unit * normal[:, None]).sum(axis=2)) > _FLAT
-    _refuse(beyond.any(axis=1), rows, "has a vector out of the plane of its face")
+    beyond = (np.abs((unit * normal[:, None]).sum(axis=2)) > _FLAT).any(axis=1)
+    if len(beyond) < 2 * beyond.sum():
+        raise InstanceError(
+            f"has vectors out of the plane of their faces in {beyond.sum()} of {len(beyond)} rows, as fields "
+            f"of another mesh; give the field of {instance.name}, with its faces in the same order"
+        )
+    _refuse(beyond, rows, "has a vector out of the plane of its face")
     return np.asarray(unit)
 
 
@@ -270,6 +215,4 @@ TEXT_WRITERS: Final[dict[str, Callable[[CrossField], bytes]]] = {
 TEXT_READERS: Final[dict[str, Callable[[bytes, Instance], CrossField]]] = {
     ".rawfield": _parse_rawfield,
     ".rosy": _parse_rosy,
-    ".ply": _parse_ply,
-    ".vtk": _parse_vtk,
 }

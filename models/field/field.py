@@ -16,6 +16,7 @@ from ..instance.instance import Instance
 from ..instance.terms import parity_sign, quarter_turns
 from ..previews import Pictured
 from .jumps import best_jumps, label_of, step_labels
+from .measures import Energy, Shape, Singularities
 
 AbsoluteNorm = Literal[1, "mixed"]
 """Norms in which pairs count with absolute values."""
@@ -43,69 +44,6 @@ def check_norm(norm: Any) -> None:
         raise InputError(f"norm is {norm!r}; give 1, 2 or 'mixed'")
 
 
-@dataclass(frozen=True)
-class Energy:
-    """The three sums of an energy and their total, each already weighted."""
-
-    smooth: float
-    strokes: float
-    beta: float
-
-    @property
-    def total(self) -> float:
-        """Smooth + strokes + beta."""
-        return self.smooth + self.strokes + self.beta
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Measures of a field that a designer sees, independent of energy and weights.
-
-    mean_deviation, most_deviation: mean and 90 % quantile of `CrossField.stroke_deviation`. far_strokes:
-    share of the strokes where it exceeds 10 degrees. narrow_pixels: share of all pixels whose lines are less
-    than 45 degrees apart.
-    """
-
-    mean_deviation: float
-    most_deviation: float
-    far_strokes: float
-    narrow_pixels: float
-
-
-@dataclass(frozen=True)
-class Singularities:
-    """Rings around which the crosses turn.
-
-    instance: on whose domain. ring: number of each, (k,). index: turns of the cross on a counter-clockwise
-    walk, (k,), multiples of 1/4; on a closed mesh they add up to the Euler characteristic.
-    """
-
-    instance: Instance
-    ring: Ints
-    index: Floats
-
-    @property
-    def row(self) -> Ints:
-        """Row of the upper left of the four pixels of each ring of a grid, (k,)."""
-        return self.instance.grid.rows[self._corner] - 1
-
-    @property
-    def column(self) -> Ints:
-        """Column of the upper left of the four pixels of each ring of a grid, (k,)."""
-        return self.instance.grid.columns[self._corner]
-
-    @property
-    def vertex(self) -> Ints:
-        """Vertex inside each ring of a mesh, (k,)."""
-        return self.instance.mesh.ring_vertices[self.ring]
-
-    @property
-    def _corner(self) -> Ints:
-        """The lower left pixel of each ring of a grid, where its first pair begins."""
-        grid = self.instance.grid
-        return np.asarray(grid.first[grid.quads[self.ring, 0]])
-
-
 @dataclass(frozen=True, eq=False)
 class CrossField(Pictured):
     """Angles of crosses and jumps between neighbours, on the grid of an instance with n pixels and m pairs.
@@ -126,7 +64,7 @@ class CrossField(Pictured):
     Raises
     ------
     InstanceError
-        If a shape does not fit the grid, or a value is not finite.
+        If a shape does not fit the grid, or a value is not an angle up to 1e6 radians.
 
     """
 
@@ -137,21 +75,19 @@ class CrossField(Pictured):
 
     def __post_init__(self) -> None:
         """Store read-only copies, and check shapes and values."""
-        domain = self.instance.domain
-        values_by_name: dict[str, np.ndarray[Any, Any]] = {
-            "alpha": float_array(self.alpha, "alpha", InstanceError),
-            "beta": float_array(self.beta, "beta", InstanceError),
-            "p": whole_numbers(self.p, "p"),
-        }
-        for (name, value), size in zip(
-            values_by_name.items(), (domain.size, domain.size, len(domain.first)), strict=True
-        ):
+        n, m = self.instance.domain.size, len(self.instance.domain.first)
+        arrays: list[tuple[str, np.ndarray[Any, Any], int]] = [
+            ("alpha", float_array(self.alpha, "alpha", InstanceError), n),
+            ("beta", float_array(self.beta, "beta", InstanceError), n),
+            ("p", whole_numbers(self.p, "p"), m),
+        ]
+        for name, value, size in arrays:
             if value.shape != (size,):
                 raise InstanceError(
                     f"{name} has shape {value.shape}, but {self.instance.name} needs ({size},)"
                 )
-            if not np.isfinite(value).all():
-                raise InstanceError(f"{name} holds a value that is not finite")
+            if not (np.abs(value) <= (np.inf if name == "p" else MOST_ANGLE)).all():
+                raise InstanceError(f"{name} holds something other than angles up to {MOST_ANGLE:g} radians")
             if name == "beta" and self.instance.orthogonal and value.any():
                 raise InstanceError(
                     f"beta is not 0 everywhere, but crosses on {self.instance.name} are orthogonal"
@@ -337,7 +273,7 @@ class CrossField(Pictured):
         Parameters
         ----------
         u_angle, v_angle
-            Angles of the lines of the others, shape (n,), or one for all pixels; radians.
+            Angles of the lines of the others, shape (n,), radians.
 
         Returns
         -------
@@ -350,10 +286,9 @@ class CrossField(Pictured):
             For the same angles as `from_lines`.
 
         """
-        size = self.instance.domain.size
         u, v = (
-            _check_angles(self.instance, np.full(size, line) if np.size(line) == 1 else line, name)
-            for name, line in (("u_angle", u_angle), ("v_angle", v_angle))
+            _check_angles(self.instance, u_angle, "u_angle"),
+            _check_angles(self.instance, v_angle, "v_angle"),
         )
         straight = line_difference(self.u_angle, u) + line_difference(self.v_angle, v)
         crossed = line_difference(self.u_angle, v) + line_difference(self.v_angle, u)

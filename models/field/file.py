@@ -18,7 +18,6 @@ from ..array_archive import ArrayArchive, ExpectedArray, pack_arrays
 from ..documents import check_schema, check_version, decode_json, parse_head, parse_json
 from ..errors import CrossfieldError, InputError, InstanceError, OutputError, naming
 from ..input_limits import MAX_ARCHIVE, MAX_GRID, MAX_HEAD
-from ..instance.angles import MOST_ANGLE
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.file import (
     instance_arrays,
@@ -128,12 +127,12 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     Parameters
     ----------
     path
-        A .npz, .json, .rawfield, .rosy, .ply or .vtk file. A .rawfield has four vectors per face, in any
-        order and of any length: u, v, -u and -v. Faces are those of the mesh; on a grid the triangles that
-        `write_field` writes, or one per pixel.
+        A .npz, .json, .rawfield or .rosy file. A .rawfield has four vectors per face, in any order and of any
+        length: u, v, -u and -v. Faces are those of the mesh; on a grid the triangles that `write_field`
+        writes, or one per pixel.
     on
-        The instance that the field must be on; a field of its other gauge is moved into its windows. All
-        files but .npz and .json need it: they contain none.
+        The instance that the field must be on; a field of its other gauge is moved into its windows. A
+        .rawfield and a .rosy need it: they contain none.
 
     Returns
     -------
@@ -178,7 +177,7 @@ def _field_of_npz(data: bytes) -> CrossField:
     check_version(parse_head(arrays), FORMAT, VERSION)
     instance = _read_embedded(lambda source: instance_of_archive(source, _PREFIX), archive)
     archive.finish()
-    return _make_field(instance, arrays["alpha"], arrays["beta"], arrays["p"])
+    return CrossField(instance, arrays["alpha"], arrays["beta"], arrays["p"])
 
 
 def _read_embedded(read: Callable[[_Entry], Instance], source: _Entry) -> Instance:
@@ -203,7 +202,9 @@ def field_to_json(field: CrossField) -> bytes:
 def _rows_of_pixels(field: CrossField) -> dict[str, tuple[np.ndarray[Any, Any], ...]]:
     """Columns of the rows of a field on pixels."""
     grid = field.instance.grid
-    upper, right = (_jump_column(field, pair) for pair in grid.pair_number)
+    jumps = np.append(field.p, 0).astype(object)
+    jumps[-1] = None  # where there is no pair
+    upper, right = (jumps[pair] for pair in grid.pair_number)
     return {"pixels": (grid.rows, grid.columns, field.alpha, field.beta, upper, right)}
 
 
@@ -211,13 +212,6 @@ def _rows_of_faces(field: CrossField) -> dict[str, tuple[np.ndarray[Any, Any], .
     """Columns of the rows of a field on faces, and of its jumps."""
     mesh = field.instance.mesh
     return {"faces": (field.alpha, field.beta), "jumps": (mesh.first, mesh.second, field.p)}
-
-
-def _jump_column(field: CrossField, pair: Ints) -> np.ndarray[Any, Any]:
-    """Jump of each pixel's pair, None without one; shape (n,), objects."""
-    jumps = np.full(len(pair), None, dtype=object)
-    jumps[pair >= 0] = field.p[pair[pair >= 0]]
-    return jumps
 
 
 def field_of_json(data: bytes) -> CrossField:
@@ -235,7 +229,7 @@ def field_of_json(data: bytes) -> CrossField:
         tables = zip(("upper", "right"), instance.grid.pair_number, (upper, right), strict=True)
         for name, pair, jumps in tables:
             _fill_jumps(p, pair, np.array(jumps, dtype=np.float64), name)
-        return _make_field(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
+        return CrossField(instance, np.array(alpha, dtype=np.float64), np.array(beta, dtype=np.float64), p)
     except OverflowError as error:
         raise InstanceError("holds a number beyond the range of doubles") from error
 
@@ -247,17 +241,6 @@ def _field_on_faces(instance: Instance, document: dict[str, Any]) -> CrossField:
     *pairs, p = np.array(document["jumps"], dtype=np.int32).reshape(-1, 3).T
     if not np.array_equal(pairs, [mesh.first, mesh.second]):
         raise InstanceError("$.jumps: lists other pairs of faces than the mesh has; write it again")
-    return _make_field(instance, alpha, beta, p)
-
-
-def _make_field(instance: Instance, alpha: Any, beta: Any, p: Any) -> CrossField:
-    """The field. Raises InstanceError for numbers that are not angles."""
-    for name, values in (("alpha", alpha), ("beta", beta)):
-        size = np.abs(np.asarray(values, dtype=np.float64))
-        if (np.isfinite(size) & (size > MOST_ANGLE)).any():  # CrossField refuses numbers that are not finite
-            raise InstanceError(
-                f"{name} has numbers beyond {MOST_ANGLE:g}, which are not angles; write it again"
-            )
     return CrossField(instance, alpha, beta, p)
 
 

@@ -1,16 +1,15 @@
-"""A problem as arrays: matrices, bounds and names, also as a model of HiGHS."""
+"""A problem as arrays: matrices, bounds and names."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from ..errors import SolverError, UnsupportedBySolverError
 from ..instance.domain import Bools, Floats, Ints
 from .families import ANY_DEGREE, PlacedFamily, merge_terms, row_sides
 from .names import Bytes, decode_names
@@ -71,6 +70,11 @@ class ProblemArrays:
     row_names: Names | None
     nonlinear: tuple[str, ...]
     family_rows: dict[str, slice]
+
+    def __repr__(self) -> str:
+        rows, columns = self.a.shape
+        entries = f"entries: a {self.a.nnz}, q {self.q.nnz}, row_products {len(self.row_products)}"
+        return f"<ProblemArrays: {columns} columns ({self.integer.sum()} integer), {rows} rows; {entries}>"
 
     def objective_value(self, point: Floats) -> float:
         """Objective at a point (n,)."""
@@ -162,57 +166,3 @@ def _rows_by_tag(families: Iterable[PlacedFamily]) -> dict[str, slice]:
         rows[family.family.tag] = slice(start, start + family.count)
         start += family.count
     return rows
-
-
-def check_highs(problem_class: str, *, convex: bool) -> None:
-    """Do nothing if HiGHS takes problems of a class.
-
-    Raises
-    ------
-    UnsupportedBySolverError
-        For quadratic rows, an objective that is quadratic and not convex, or quadratic with integers, and
-        for everything beyond degree 2.
-
-    """
-    if problem_class in {"LP", "MILP"} or (problem_class == "QP" and convex):
-        return
-    kind = f"{'a convex' if convex else 'a non-convex'} {problem_class}"
-    raise UnsupportedBySolverError(
-        f"HiGHS takes LP, MILP and convex QP, but this is {kind}; choose milp-mccormick or qp-fixed, "
-        "relax=True, or a solver that `crossfield list` shows for it"
-    )
-
-
-def build_highs(arrays: ProblemArrays, name: str) -> Any:
-    """Return a `highspy.Highs` that holds the arrays. Raises SolverError if HiGHS refuses them."""
-    import highspy
-
-    model = highspy.HighsModel()
-    lp, by_column = model.lp_, arrays.a.tocsc()
-    lp.num_col_, lp.num_row_ = len(arrays.c), arrays.a.shape[0]
-    lp.col_cost_, lp.offset_, lp.model_name_ = arrays.c, arrays.constant, name
-    lp.col_lower_, lp.col_upper_ = arrays.lower, arrays.upper
-    lp.row_lower_, lp.row_upper_ = arrays.row_lower, arrays.row_upper
-    lp.a_matrix_.format_ = highspy.MatrixFormat.kColwise
-    _fill_matrix(lp.a_matrix_, by_column)
-    if arrays.integer.any():
-        kinds = np.array([highspy.HighsVarType.kContinuous, highspy.HighsVarType.kInteger])
-        lp.integrality_ = kinds[arrays.integer.astype(np.intp)].tolist()
-    if arrays.column_names is not None and arrays.row_names is not None:
-        lp.col_names_, lp.row_names_ = arrays.column_names.tolist(), arrays.row_names.tolist()
-    if arrays.q.nnz:
-        model.hessian_.dim_ = len(arrays.c)
-        model.hessian_.format_ = highspy.HessianFormat.kTriangular
-        _fill_matrix(model.hessian_, sparse.tril(arrays.q, format="csc"))
-    solver = highspy.Highs()  # type: ignore[no-untyped-call]
-    solver.setOptionValue("output_flag", False)  # noqa: FBT003 - as highspy has it
-    if solver.passModel(model) == highspy.HighsStatus.kError:
-        raise SolverError(f"HiGHS {solver.version()} refuses the arrays of {name}")
-    return solver
-
-
-def _fill_matrix(matrix: Any, columns: sparse.csc_array) -> None:
-    columns.sort_indices()
-    matrix.start_ = columns.indptr.astype(np.int32)
-    matrix.index_ = columns.indices.astype(np.int32)
-    matrix.value_ = columns.data

@@ -9,33 +9,26 @@ symbols.py; operators and functions: expressions.py.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
-from functools import cache
-from typing import Any, Final
+from typing import Final
 
-from ..field.field import Norm
-from ..instance.instance import Instance
 from .declaration import (
     FORMULATIONS,
     S_C,
     C,
-    Declaration,
     E,
     Facet,
     Family,
-    Formulation,
     I,
-    Options,
     declaration_of,
     formulation,
     row,
     short_names,
     term,
 )
-from .expressions import Expression, Operand, Symbol, Term, cos, equal
+from .expressions import Operand, cos, equal
+from .indices import Indices
 from .symbols import (
     B_LIFTED,
-    OF_SKEW,
     A,
     B,
     R,
@@ -43,7 +36,6 @@ from .symbols import (
     beta_i,
     beta_j,
     change_of_direction,
-    constants_of,
     d,
     d_round,
     gamma,
@@ -87,12 +79,6 @@ QUARTIC: Final = omega * (2 * (A**2 + B**2))
 """The smoothness of a pair, (8)."""
 CUBIC: Final = QUARTIC.expanded(p1)
 """(8) expanded, with p1^2 = p1: (9)."""
-
-_EXACT: Final = "z = p1 beta_i with the hull facets (26)-(29), exact"
-_WEAKER: Final = (
-    "z for p1 beta_i between the hull facets (26)-(29), a relaxation: "
-    "p1 is not only 0 or 1 here; .nl and .gms hold the products"
-)
 
 Families = Iterator[Family]
 
@@ -241,7 +227,7 @@ def milp_orthogonal(stroke_norm: int = 1) -> Families:
     "miqp-cycle", paper="ours", kind="convex MIQP", short="cycle",
     minimises=RIGHT_TWO_NORM, how=BY_CYCLES, orthogonal=True,
 )  # fmt: skip
-def miqp_cycle(limits: bool = False) -> Families:  # noqa: ARG001 - the bounds of d and q depend on it
+def miqp_cycle(limits: bool = False, indices: Indices = ()) -> Families:  # noqa: ARG001 - bounds depend on them
     """Orthogonal crosses without windows and alpha: one integer per cycle."""
     yield term("smooth", E, omega * (2 * d**2))
     yield from strokes(2, q)
@@ -252,7 +238,7 @@ def miqp_cycle(limits: bool = False) -> Families:  # noqa: ARG001 - the bounds o
     "milp-cycle", paper="ours", kind="MILP", short="cycle1",
     minimises=RIGHT_ONE_NORM, how=BY_CYCLES, orthogonal=True,
 )  # fmt: skip
-def milp_cycle(stroke_norm: int = 1) -> Families:
+def milp_cycle(stroke_norm: int = 1, indices: Indices = ()) -> Families:  # noqa: ARG001 - the bounds of k
     """Orthogonal crosses in the 1-norm without windows and alpha: one integer per cycle."""
     yield term("smooth", E, omega * (2 * s))
     yield row(14, E, s >= d)
@@ -309,104 +295,6 @@ def facets_of_z(facet: Facet) -> Families:
     yield row(27, E, z <= beta_i - pi / 4 * p1 + pi / 4)
     yield row(28, E, z <= pi / 4 * p1)
     yield row(29, E, z >= beta_i + pi / 4 * p1 - pi / 4)
-
-
-def declare(name: str, on: Instance | None = None, **chosen: Any) -> Formulation:
-    """The formulation of a name, full or short, with options (`Options`).
-
-    on: the instance whose domain it is written for, None for the pixels of a sketch. An option that is None
-    keeps its default. Raises FormulationError for an unknown name, option or value.
-    """
-    declaration = declaration_of(name)
-    options = declaration.options({key: value for key, value in chosen.items() if value is not None})
-    constants = constants_of(on, orthogonal=declaration.orthogonal)
-    return _declare(declaration, options, tuple(constants.items()))
-
-
-def reason_against(formulation: Formulation, instance: Instance | None, *, narrowed: bool = False) -> str:
-    """Why an instance, None for the pixels of a sketch, cannot have a formulation; empty if it can.
-
-    narrowed: whether its windows are narrower than those of its gauge.
-    """
-    has_windows = "alpha" in formulation.variables
-    if not formulation.declaration.orthogonal:
-        return ""
-    if instance is None or not instance.orthogonal:
-        return "is for orthogonal crosses only; make the instance with orthogonal=True"
-    if instance.gauge == "box" and (formulation.options.limits or not has_windows):
-        return (
-            "lets crosses have every label, and the gauge box does not at strokes; choose the gauge strokes"
-        )
-    return "has no windows to narrow; choose miqp-orthogonal" if narrowed and not has_windows else ""
-
-
-def list_formulations(instance: Instance | None = None, *, narrowed: bool = False) -> list[str]:
-    """The names of all formulations that an instance can have."""
-    return [name for name in FORMULATIONS if not reason_against(declare(name), instance, narrowed=narrowed)]
-
-
-@cache
-def _declare(
-    declaration: Declaration, options: Options, constants: tuple[tuple[Symbol, int], ...]
-) -> Formulation:
-    """The formulation with numbers for symbols, without the terms and rows that vanish."""
-    formulation, numbers = declaration.with_options(options), dict(constants)
-    vanishing = set(OF_SKEW) & numbers.keys()
-    families = [
-        replace(family, expression=family.expression.substitute(numbers))
-        for family in (*formulation.objective, *formulation.rows)
-        if not (family.is_row and vanishing & family.expression.symbols)
-    ]
-    return replace(
-        formulation,
-        objective=tuple(family for family in families if not family.is_row and family.body.terms),
-        rows=tuple(family for family in families if family.is_row),
-    )
-
-
-def norm_of(declaration: Declaration, options: Options) -> Norm | None:
-    """The norm whose energy a formulation minimises with some options; None for another objective."""
-    if declaration.minimises in {TWO_NORM, AT_JUMPS, RIGHT_TWO_NORM}:
-        return 2
-    if declaration.orthogonal:
-        return 1 if options.stroke_norm == 1 else "mixed"
-    norms: dict[tuple[int, int], Norm] = {(1, 1): 1, (2, 2): "mixed"}
-    return norms.get((options.stroke_norm, options.beta_norm)) if options.facet == "hull" else None
-
-
-def lift_products(formulation: Formulation) -> Formulation:
-    """The formulation with z for every product p1 beta_i, and its hull facets.
-
-    It is the same problem while p1 is 0 or 1. With integrality dropped the result is a relaxation
-    (`Formulation.weakened`). A square stays a square of a linear expression, so that (8) becomes convex; (9)
-    stays the expanded polynomial with 4 z beta_j.
-    """
-    lifted = tuple(replace(family, expression=_lift(family.body)) for family in formulation.objective)
-    return replace(
-        formulation,
-        objective=lifted,
-        rows=(*facets_of_z("hull"), *formulation.rows),
-        lifted=_WEAKER if formulation.options.relax else _EXACT,
-    )
-
-
-def _lift(expression: Expression) -> Expression:
-    """The expression with z for p1 beta_i; squares of sums are kept, and the sums expanded."""
-    inside = expression.map_factors(
-        lambda factor, power: (
-            (_lift(factor.expanded() if power > 1 else factor) if isinstance(factor, Expression) else factor)
-            ** power
-        )
-    )
-    return Expression(tuple(map(_lift_term, inside.terms)))
-
-
-def _lift_term(term: Term) -> Term:
-    powers = dict(term.factors)
-    if p1 not in powers or beta_i not in powers:
-        return term
-    powers |= {p1: powers[p1] - 1, beta_i: powers[beta_i] - 1, z: 1}
-    return Term(term.constant, tuple((factor, power) for factor, power in powers.items() if power))
 
 
 __all__ = ["FORMULATIONS", "declaration_of", "short_names"]  # the table and its names come from there

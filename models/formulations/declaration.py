@@ -18,6 +18,7 @@ from typing import Any, Final, Literal, get_args
 from ..arguments import check_choice, check_flag
 from ..errors import FormulationError, shortened
 from .expressions import Expression, Operand, Relation, Symbol, Term, expression_of, sum_of
+from .indices import Indices, as_indices
 from .symbols import (
     BOUNDED,
     SLOTS,
@@ -128,7 +129,7 @@ class Options:
     """Choices that a formulation leaves open.
 
     facet of z; norms of the two terms; relax: integrality dropped; limits: whether residuals are limited to
-    what no change of one jump improves (`limit_residuals`).
+    what no change of one jump improves (`limit_residuals`); indices: prescribed ones of vertices.
     """
 
     facet: Facet = "hull"
@@ -136,11 +137,12 @@ class Options:
     beta_norm: int = 2
     relax: bool = False
     limits: bool = False
+    indices: Indices = ()
 
     @property
     def document(self) -> dict[str, Any]:
-        """The options as files record them: limits only where they are chosen, as older files have none."""
-        return {name: value for name, value in vars(self).items() if name != "limits" or value}
+        """The options as files record them: the last two only where they are chosen, for older files."""
+        return {k: value for k, value in vars(self).items() if k not in {"limits", "indices"} or value}
 
     def __repr__(self) -> str:
         return f"Options({', '.join(f'{name}={value!r}' for name, value in self.document.items())})"
@@ -229,7 +231,12 @@ class Declaration:
                 raise FormulationError(f"{name} is {getattr(options, name)}; give 1 or 2")
         # NumPy's numbers are written differently, and the options are a part of the problem's hash.
         norms = int(options.stroke_norm), int(options.beta_norm)
-        return Options(options.facet, *norms, bool(options.relax), bool(options.limits))
+        indices = as_indices(options.indices)
+        if indices and options.limits:
+            raise FormulationError(
+                "limits hold where every jump may change, and indices prescribe some; leave one of them out"
+            )
+        return Options(options.facet, *norms, bool(options.relax), bool(options.limits), indices)
 
 
 @dataclass(frozen=True)
@@ -251,27 +258,12 @@ class Formulation:
         return self.declaration.name
 
     @property
-    def paper(self) -> str:
-        """Its section of the paper, or `ours`."""
-        return self.declaration.paper
-
-    @property
-    def summary(self) -> str:
-        """One line on the feature that distinguishes the formulation."""
-        return self.declaration.summary
-
-    @property
-    def fixed(self) -> tuple[str, ...]:
-        """Variables that are data: p1 and p2 of `qp-fixed`."""
-        return self.declaration.fixed
-
-    @property
     def variables(self) -> tuple[str, ...]:
         """Names of the blocks of columns, in the order of VARIABLES."""
         used = {
             family.slots[symbol][0] for family in (*self.objective, *self.rows) for symbol in family.symbols
         }
-        return tuple(name for name in VARIABLES if name in used and name not in self.fixed)
+        return tuple(name for name in VARIABLES if name in used and name not in self.declaration.fixed)
 
     def variable(self, name: str) -> Variable:
         """The declaration of a block of columns."""
@@ -298,7 +290,12 @@ class Formulation:
     @property
     def is_convex(self) -> bool:
         """Whether its continuous relaxation is convex as written: linear rows, a sum of squares."""
-        return _is_convex(self.objective, self.rows, self.fixed)
+        return _is_convex(self.objective, self.rows, self.declaration.fixed)
+
+    @property
+    def has_convex_objective(self) -> bool:
+        """Whether its objective is a sum of squares as written."""
+        return _is_convex(self.objective, (), self.declaration.fixed)
 
 
 @cache

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import builtins
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property, reduce
 from typing import Any, Final
@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 from .declaration import Family
-from .expressions import Expression, Symbol
+from .expressions import Expression, Functions, Symbol
 from .symbols import SCALARS, IndexSet, index_map, values_at
 
 Coefficient = float | Floats
@@ -165,6 +165,22 @@ class PlacedFamily:
         }
         return np.broadcast_to(np.asarray(self.family.body.evaluate(values), dtype=float), (self.count,))
 
+    def over_objects(
+        self, expression: Expression, columns: Sequence[Any], functions: Functions
+    ) -> Iterator[Any]:
+        """An expression at each element over objects with operators, such as variables of a solver package.
+
+        columns: one object for each column of the problem. functions: of such objects.
+        """
+        values = {symbol: self._objects(symbol, columns) for symbol in expression.symbols}
+        elements = zip(*values.values(), strict=True) if values else [()] * self.count
+        return (expression.evaluate(dict(zip(values, each, strict=True)), functions) for each in elements)
+
+    def _objects(self, symbol: Symbol, columns: Sequence[Any]) -> list[Any]:
+        if symbol in self.variables:
+            return [columns[column] for column in self.column_of(symbol).tolist()]
+        return np.broadcast_to(self.datum(symbol), (self.count,)).tolist()  # type: ignore[no-any-return]
+
     def excess(self, point: Floats) -> Floats:
         """By how much a point breaks each row, shape (count,): 0 or less where it holds."""
         values = self.values(point)
@@ -221,11 +237,6 @@ def sort_factors(factors: tuple[Ints, ...]) -> Ints:
 
 def merge_monomials(index: Ints, coefficient: Floats, scale: Floats, columns: int) -> tuple[Ints, Floats]:
     """Sums over equal rows of `index`, sorted, without noise. columns: a number above every index."""
-    if index.shape[1] == 1:  # a column is its own rank
-        rank = index[:, 0] - (first := index.min())
-        total, largest = (_sums_by_rank(values, rank, 0) for values in (coefficient, scale))
-        kept = np.flatnonzero(exceeds_noise(total, largest))
-        return (kept + first).astype(index.dtype)[:, None], total[kept]
     key = index[:, 0].astype(np.int64)
     for factor in range(1, index.shape[1]):
         key = key * columns + index[:, factor]

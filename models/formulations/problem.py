@@ -17,17 +17,19 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from .. import above
 from ..arguments import float_array, whole_numbers
 from ..errors import FormulationError, InputError
 from ..field.field import CrossField
 from ..instance.angles import QUARTER
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
-from ..previews import table_of
-from .catalogue import declare, lift_products, norm_of, reason_against
+from .choice import declare, norm_of, reason_against
 from .declaration import Family, Formulation
 from .expressions import Operand, expression_of
 from .families import ANY_DEGREE, Block, PlacedFamily, merge_terms
+from .indices import fix_turns, with_rings
+from .lifting import lift_products
 from .residuals import angles_and_jumps, residual_data
 from .symbols import (
     NARROWED,
@@ -86,7 +88,8 @@ class Problem:
     ------
     FormulationError
         For jumps that are missing, or that are given to a formulation in which they are variables; for a
-        formulation of orthogonal crosses on another instance, or without windows on one of the gauge `box`.
+        formulation of orthogonal crosses on another instance, or without windows on one of the gauge `box`;
+        for indices that no field has.
 
     """
 
@@ -100,10 +103,10 @@ class Problem:
         """Check that jumps are given exactly where they are data, and that fixed values fit the instance."""
         if reason := reason_against(self.formulation, self.instance, narrowed=self.windows is not None):
             raise FormulationError(f"{self.name} {reason}")
-        if (self.jumps is None) == bool(self.formulation.fixed):
+        if (self.jumps is None) == bool(self.formulation.declaration.fixed):
             raise FormulationError(
                 f"{self.formulation.name} takes the jumps of all pairs as data; give p=field.p"
-                if self.formulation.fixed
+                if self.formulation.declaration.fixed
                 else f"{self.formulation.name} has the jumps as variables; leave p out"
             )
         if self.jumps is not None:
@@ -116,22 +119,12 @@ class Problem:
             self.pinned.check_instance(self.instance)
         if self.windows is not None:
             self.windows.check(self.instance)
+        if indices := self.formulation.options.indices:
+            object.__setattr__(self, "instance", with_rings(self.instance, indices))
+            self.data.keys()  # raises for indices that no field has
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
-
-    def _repr_html_(self) -> str:
-        """A table of its columns and rows, for notebooks."""
-        facts = {
-            "formulation": f"{self.name}: {self.formulation.summary}",
-            "class": self.problem_class + (", convex" if self.is_convex else ""),
-            "instance": self.instance.summary,
-            "columns": ", ".join(
-                f"{block.count} {block.name}{' (integer)' * block.integer}" for block in self.blocks.values()
-            ),
-            "rows": ", ".join(f"{family.count} {family.family.tag}" for family in self.rows) or "none",
-        }
-        return table_of(f"Problem {self.summary}", facts)
 
     def _repr_latex_(self) -> str | None:
         """The formulation in formulas, for notebooks; None without SymPy."""
@@ -173,6 +166,8 @@ class Problem:
         if self.formulation.declaration.orthogonal:
             has_cycles = "k" in self.formulation.variables
             data |= residual_data(self.instance, self.formulation.options.limits, cycles=has_cycles)
+        if indices := self.formulation.options.indices:
+            data["k_min"], data["k_max"] = fix_turns(self.instance, indices, data["k_min"], data["k_max"])
         if self.jumps is not None:
             data |= {"p1": self.jumps & 1, "p2": self.jumps >> 1}
         return data if self.windows is None else data | self.windows.data
@@ -197,7 +192,9 @@ class Problem:
 
     @property
     def limited(self) -> str:
-        """What the limits of residuals cut off, one line; empty without them."""
+        """A line on the fields that limits or prescribed indices exclude; empty without them."""
+        if indices := self.formulation.options.indices:
+            return f"the indices of {len(indices)} vertices are prescribed, and |A| and |R| are at most pi/4"
         if not self.formulation.options.limits:
             return ""
         effect = "the relaxation may rise" if self.formulation.options.relax else "the optimum stays"
@@ -236,6 +233,22 @@ class Problem:
     def n_columns(self) -> int:
         """Number of columns."""
         return sum(block.count for block in self.blocks.values())
+
+    @property
+    def column_names(self) -> list[str]:
+        """Names of all columns, as in files."""
+        from .names import column_names, decode_names
+
+        names: list[str] = decode_names(column_names(self.instance, self.blocks)).tolist()
+        return names
+
+    @property
+    def row_names(self) -> list[str]:
+        """Names of all rows, as in files."""
+        from .names import decode_names, row_names
+
+        names: list[str] = decode_names(row_names(self.rows)).tolist()
+        return names
 
     @cached_property
     def lower(self) -> Floats:
@@ -344,6 +357,29 @@ class Problem:
         """
         return merge_terms(self.objective, degree, self.n_columns, up_to=up_to)
 
+    def with_integers_fixed(self, field: CrossField) -> Problem:
+        """Return the problem with its integer columns fixed at the jumps of a field: a continuous problem.
+
+        Fixed columns stay, with equal bounds; names and order do not change.
+
+        Parameters
+        ----------
+        field
+            A field on its instance.
+
+        Returns
+        -------
+        Problem
+            The continuous problem.
+
+        Raises
+        ------
+        InstanceError
+            For a field on another instance.
+
+        """
+        return replace(self, pinned=field)
+
     def to_arrays(self, *, names: bool = True) -> ProblemArrays:
         """Return the problem up to degree 2 as NumPy arrays and SciPy matrices.
 
@@ -368,18 +404,95 @@ class Problem:
     def to_highs(self) -> Any:
         """Return a `highspy.Highs` with the problem, passed by arrays; its output is switched off.
 
-        Names and order are those of the files. There is no column ONE.
+        This and the other conversions hold the same columns and rows, under the names of the files, and the
+        stamp, so that `solution` identifies the problem. A QP without rows has one empty row, because HiGHS
+        may otherwise stop far above the optimum.
 
         Raises
         ------
+        MissingSolverError
+            Without the package.
         UnsupportedBySolverError
             When the problem is neither an LP or MILP nor a convex QP.
 
         """
-        from .arrays import build_highs, check_highs
+        return above.packages().convert("highs", self)
 
-        check_highs(self.problem_class, convex=self.is_convex)
-        return build_highs(self.to_arrays(), self.instance.name)
+    def to_gurobi(self) -> Any:
+        """Return a `gurobipy.Model` with the problem; its output is switched off.
+
+        Products are lifted beyond degree 2. Raises as `to_highs`, here for cosines.
+        """
+        return above.packages().convert("gurobi", self)
+
+    def to_scip(self) -> Any:
+        """Return a `pyscipopt.Model` with the problem; its output is switched off.
+
+        Raises MissingSolverError without the package.
+        """
+        return above.packages().convert("scip", self)
+
+    def to_linopy(self) -> Any:
+        """Return a `linopy.Model` with the problem, with one variable per block of columns.
+
+        Products in rows and beyond degree 2 are lifted. Raises as `to_highs`, here for cosines.
+        """
+        return above.packages().convert("linopy", self)
+
+    def to_pyomo(self, *, start: CrossField | None = None) -> Any:
+        """Return a Pyomo model with the problem; its objective is `obj`.
+
+        Variables have indices (row, column) of a pixel, or (row, column, side) of a pair, where side is `u`
+        or `r`. On a mesh the indices are numbers of faces and pairs. `start` is a field whose point is the
+        initial value of every variable.
+
+        Raises InstanceError for a start on another instance.
+        """
+        return above.packages().convert("pyomo", self, start=start)
+
+    def solution(
+        self,
+        values: Any,
+        *,
+        status: str = "",
+        bound: float | None = None,
+        gap: float | None = None,
+        tolerance: float | None = None,
+    ) -> Any:
+        """Check an answer in memory as `read_solution` checks a file.
+
+        Parameters
+        ----------
+        values
+            Values in the order of the columns, a dictionary or pandas Series by name, or a model that was
+            solved: a `highspy.Highs`, `gurobipy.Model`, `pyscipopt.Model` or `linopy.Model`, or the Pyomo
+            model of `to_pyomo`.
+        status
+            Status or the program's word for it. By default that of the model; a Pyomo model has none.
+        bound
+            Dual bound that the program has proven. The greater of this one and the model's counts.
+        gap
+            Relative gap that the program was given, if it calls its point optimal without a bound.
+        tolerance
+            Largest violation of a feasible point, in units of a column; 1e-5 by default.
+
+        Returns
+        -------
+        Solution
+            The point, the claims, and the recomputed values. Only a bound that closes the gap proves an
+            optimum, or the word of a program that searches to the end.
+
+        Raises
+        ------
+        InputError
+            For values that are none of these, and for a bound or gap out of range.
+        SolutionError
+            For values of another problem, and for a model that was not solved.
+
+        """
+        return above.packages().check_values(
+            self, values, status=status, bound=bound, gap=gap, tolerance=tolerance
+        )
 
     def objective_value(self, point: Floats) -> float:
         """The objective at a point (columns,). Raises InputError for another shape."""
@@ -452,7 +565,7 @@ class Problem:
 
         Manifests hold this hash; the stamp is short enough for names.
         """
-        return stamp_of(self._digest(""))
+        return f"sha256_{self._digest('')[:STAMP_DIGITS]}"
 
     @property
     def is_recordable(self) -> bool:
@@ -463,8 +576,13 @@ class Problem:
     def lifted(self) -> Problem:
         """The problem with each p1 beta_i lifted to z, for formats up to quadratic.
 
-        Relaxed, it is weaker (`Formulation.is_weakened`).
+        Relaxed, it is weaker (`Formulation.is_weakened`). Raises FormulationError for cosines.
         """
+        if self.objective_degree == ANY_DEGREE:
+            raise FormulationError(
+                f"{self.name} has cosines, which no lifting removes; "
+                f"choose {self.formulation.equivalent or 'another formulation'}"
+            )
         return replace(self, formulation=lift_products(self.formulation))
 
     def _digest(self, lifting: str) -> str:
@@ -497,11 +615,6 @@ def _at_field(problem: Problem, name: str, quantities: dict[str, Any]) -> Floats
     return np.asarray(value.evaluate(values), dtype=np.float64)
 
 
-def stamp_of(sha256: str) -> str:
-    """Return the stamp of the problem with that hash: short enough for names in files."""
-    return f"sha256_{sha256[:STAMP_DIGITS]}"
-
-
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
     """Bind a formulation to an instance.
 
@@ -515,8 +628,8 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
         Jumps of the pairs, shape (m,), for `qp-fixed` only.
     options
         Where the formulation has them: `facet` (`hull` or `printed`), `stroke_norm` and `beta_norm` (1 or 2),
-        `relax` (True makes integers continuous), and `limits` (True cuts off fields that a change of one
-        jump improves).
+        `relax` (True makes integers continuous), `limits` (True cuts off fields that a change of one jump
+        improves), and `indices`: pairs of a vertex and four times the index that its ring must have.
 
     Returns
     -------
@@ -530,37 +643,3 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
 
     """
     return Problem(instance, declare(name, instance, **options), p)
-
-
-def with_integers_fixed(problem: Problem, field: CrossField) -> Problem:
-    """Return a problem with its integer columns fixed at the jumps of a field: a continuous problem.
-
-    Fixed columns stay, with equal bounds; names and order do not change.
-
-    Parameters
-    ----------
-    problem
-        The problem.
-    field
-        A field on its instance.
-
-    Returns
-    -------
-    Problem
-        The continuous problem.
-
-    Raises
-    ------
-    InstanceError
-        For a field on another instance.
-
-    """
-    return replace(problem, pinned=field)
-
-
-def with_windows(problem: Problem, windows: Windows | None) -> Problem:
-    """The same problem with narrower windows of alpha and beta, and narrower ranges of jumps.
-
-    windows: None for those of the gauge. Raises InstanceError for windows beyond those of the gauge.
-    """
-    return replace(problem, windows=windows)

@@ -6,12 +6,11 @@ from typing import Any, Final
 
 import numpy as np
 
-from ..instance.angles import HALF, QUARTER, wrap
+from ..instance.angles import HALF, QUARTER, SLACK, wrap
 from ..instance.cycles import integrate
 from ..instance.domain import Floats
 from ..instance.instance import Instance
 
-_SLACK: Final = 1e-9  # quarter turns, as in the ranges of jumps
 _ROUNDING: Final = 1e-8  # radians added to a limit: more than its error, and than SCIP takes for 0
 _ZERO: Final = 2e-9  # radians of a right side that SCIP reads as 0: rounding of angles or of coordinates
 _BLOCK: Final = 256  # right sides that are solved at once, which bounds memory
@@ -61,8 +60,8 @@ def _cycle_data(instance: Instance, d_max: Floats, q_max: Floats) -> dict[str, A
         "sign": cycles.sign.astype(np.float64),
         "is_open": is_open.astype(np.int32),
         "holonomy": holonomy,
-        "k_min": np.ceil((-reach - holonomy) / HALF - _SLACK),
-        "k_max": np.floor((reach - holonomy) / HALF + _SLACK),
+        "k_min": np.ceil((-reach - holonomy) / HALF - SLACK),
+        "k_max": np.floor((reach - holonomy) / HALF + SLACK),
     }
 
 

@@ -10,11 +10,10 @@ import numpy as np
 from ..arguments import whole_numbers
 from ..errors import InstanceError
 from ..field.field import Norm
-from ..instance.angles import QUARTER
+from ..instance.angles import QUARTER, SLACK
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import Instance
 
-_SLACK = 1e-9
 _ARRAYS = ("alpha_lower", "alpha_upper", "beta_lower", "beta_upper", "p_min", "p_max")
 _SYMBOLS = ("alpha_lo", "alpha_up", "beta_lo", "beta_up", "p_min", "p_max")
 
@@ -48,7 +47,7 @@ class Windows:
         ):
             if low.shape != least.shape or high.shape != least.shape:
                 raise InstanceError(f"the windows of {name} do not fit the grid of {instance.name}")
-            wrong: Bools = ~((low >= least - _SLACK) & (low <= high) & (high <= most + _SLACK))
+            wrong: Bools = ~((low >= least - SLACK) & (low <= high) & (high <= most + SLACK))
             if wrong.any():
                 raise InstanceError(
                     f"the window of {name} number {int(np.argmax(wrong))} is empty or beyond the gauge's"

@@ -16,6 +16,7 @@ from .domain import Floats
 QUARTER: Final = np.pi / 4
 HALF: Final = np.pi / 2
 MOST_ANGLE: Final = 1e6  # largest absolute angle in radians that keeps enough digits modulo pi
+SLACK: Final = 1e-9  # radians or quarter turns by which rounding may move the end of a range
 _TERMS: Final = 9  # of the series of sine and cosine: beyond, less than 1e-17 on [-pi/4, pi/4]
 _SINE: Final = [(-1) ** k / factorial(2 * k + 1) for k in range(_TERMS)]
 _COSINE: Final = [(-1) ** k / factorial(2 * k) for k in range(_TERMS)]

@@ -33,23 +33,28 @@ class Forest:
 class Cycles(Walks):
     """The basis: closed walks, and walks from a stroke to a stroke.
 
-    ends: strokes at which each walk starts and ends, -1 for a closed one, shape (c, 2).
+    ends: strokes at which each walk starts and ends, -1 for a closed one, shape (c, 2). rings: numbers of the
+    rings that are the first walks.
     """
 
     ends: Ints
     forest: Forest
+    rings: Ints
 
     def places(self, step: int) -> Ints:
         """Place of a step in `pair` and `sign`, of the last step in shorter walks, shape (c,)."""
         return np.minimum(self.start[:-1] + step, self.start[1:] - 1).astype(np.int32)
 
 
-def find_cycles(domain: Domain, stroke_index: Ints) -> Cycles:
-    """The basis for a domain with strokes at some points; the same for equal arguments."""
+def find_cycles(domain: Domain, stroke_index: Ints, wanted: Ints | None = None) -> Cycles:
+    """The basis for a domain with strokes at some points; the same for equal arguments.
+
+    wanted: rings that it has, unless they are all rings of a closed part.
+    """
     forest = grow_forest(domain.size, domain.first, domain.second, stroke_index)
     chords = np.ones(len(domain.first), dtype=bool)
     chords[forest.pair[forest.pair >= 0]] = False
-    rings, replaced = _choose_rings(domain, np.nonzero(chords)[0].astype(np.int32), forest)
+    rings, replaced = _choose_rings(domain, np.nonzero(chords)[0].astype(np.int32), forest, wanted)
     chords[replaced] = False
     steps, ends = _walk_round(domain, np.nonzero(chords)[0].astype(np.int32), forest)
     of_ring = np.repeat(np.arange(len(rings)), np.diff(domain.rings.start))
@@ -64,6 +69,7 @@ def find_cycles(domain: Domain, stroke_index: Ints) -> Cycles:
         np.concatenate([domain.rings.sign[kept], steps[2]]).astype(np.int32),
         np.concatenate([np.full((int(rings.sum()), 2), -1), np.where(is_open[:, None], stroke[ends], -1)]),
         forest,
+        np.nonzero(rings)[0].astype(np.int32),
     )
 
 
@@ -107,7 +113,7 @@ def grow_forest(size: int, first: Ints, second: Ints, roots: Ints | list[int]) -
     return Forest(depth, pair)
 
 
-def _choose_rings(domain: Domain, chords: Ints, forest: Forest) -> tuple[Bools, Ints]:
+def _choose_rings(domain: Domain, chords: Ints, forest: Forest, wanted: Ints | None) -> tuple[Bools, Ints]:
     """Independent rings (r,), and the pairs outside the forest whose walks they replace, one per ring.
 
     All rings around the corners of a closed part add up to nothing, so one of them is left out.
@@ -129,9 +135,10 @@ def _choose_rings(domain: Domain, chords: Ints, forest: Forest) -> tuple[Bools, 
     graph = coo_array((place + 1.0, (low[place], high[place])), shape=shape).tocsr()
     chosen = minimum_spanning_tree(graph).tocoo().data.astype(np.int64) - 1
     part = connected_components(graph, directed=False)[1]
-    parts, first_ring = np.unique(part[:count], return_index=True)
+    order = np.argsort(np.isin(np.arange(count), [] if wanted is None else wanted), kind="stable")
+    parts, first_ring = np.unique(part[:count][order], return_index=True)
     independent = np.ones(count, dtype=bool)
-    independent[first_ring[parts != part[count]]] = False
+    independent[order[first_ring[parts != part[count]]]] = False
     return independent, chords[chosen]
 
 

@@ -133,32 +133,18 @@ class Domain(ABC):
     def places(self, points: Ints) -> Ints:
         """Positions of points as files list them: row and column (k, 2), or number of the face (k,)."""
 
-    @cached_property
+    @property
     def parts(self) -> int:
         """Number of connected parts."""
+        return len(np.unique(self.part_of_points))
+
+    @cached_property
+    def part_of_points(self) -> NDArray[np.int64]:
+        """The first point of the connected part of each point, (n,)."""
         least = np.arange(self.size)  # the first point known to belong to the same part, of each point
         while len(between := np.nonzero(least[self.first] != least[self.second])[0]):
             one, other = least[self.first[between]], least[self.second[between]]
             np.minimum.at(least, np.maximum(one, other), np.minimum(one, other))
             while (least[least] != least).any():
                 least = least[least]
-        return len(np.unique(least))
-
-    @cached_property
-    def pairs_of_points(self) -> list[tuple[str, Ints]]:
-        """Tables (n,) of pairs, -1 for none: those of a point, in ascending order, and its end in each.
-
-        Pairs are numbered by their first points. So those with an earlier point come first, then those that
-        begin at the point, then those with a later one.
-        """
-        earlier, later, tables = self.first < self.second, self.first > self.second, []
-        for end, chosen in (("second", earlier), ("first", earlier | later), ("second", later)):
-            pair, point_of = np.nonzero(chosen)[0].astype(np.int32), getattr(self, end)
-            pair = pair[np.argsort(point_of[pair], kind="stable")]
-            point = point_of[pair]
-            before = np.arange(len(pair)) - np.searchsorted(point, point)  # pairs of the same point
-            for count in range(int(before.max(initial=-1)) + 1):
-                table = np.full(self.size, -1, dtype=np.int32)
-                table[point[before == count]] = pair[before == count]
-                tables.append((end, table))
-        return tables
+        return least

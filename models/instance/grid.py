@@ -131,6 +131,22 @@ class Grid(Domain):
         inside = (columns >= 0) & (columns < self.width) & (self._keys[at] == key)
         return np.where(inside, at, -1).astype(np.int32)
 
+    def numbers_of(self, pixels: Ints) -> Ints:
+        """Number of each pixel [row, column], (s,). Raises InstanceError for one outside the mask."""
+        if pixels.size == 0:
+            return np.zeros(0, dtype=np.int32)
+        if pixels.ndim != 2 or pixels.shape[1] != 2:
+            raise InstanceError(
+                f"stroke_pixels has shape {pixels.shape}; give [row, column] for each stroke pixel"
+            )
+        number = self.numbers_at(*pixels.T)
+        if (number < 0).any():
+            row, column = pixels[int(np.argmax(number < 0))]
+            raise InstanceError(
+                f"stroke pixel [{row}, {column}]: is outside the mask ({int((number < 0).sum())} in all)"
+            )
+        return number
+
     @cached_property
     def _keys(self) -> NDArray[np.int64]:
         return self.rows.astype(np.int64) * self.width + self.columns

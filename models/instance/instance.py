@@ -9,12 +9,11 @@ from functools import cached_property
 from typing import Any, Final, Literal, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..arguments import check_choice, check_flag, float_array, whole_numbers
+from ..arguments import boolean_array, check_choice, check_flag, float_array, whole_numbers
 from ..errors import DomainError, InstanceError, NoStrokeError
 from ..previews import Pictured
-from .angles import HALF, MOST_ANGLE, QUARTER, wrap
+from .angles import HALF, MOST_ANGLE, QUARTER, SLACK, wrap
 from .cycles import Cycles, find_cycles
 from .domain import Bools, Floats, Ints
 from .grid import Grid
@@ -27,7 +26,6 @@ GAUGES: Final[tuple[Gauge, ...]] = get_args(Gauge)
 _FLAT = 1e-8  # directions closer than this to the horizontal or to 45 degrees are these
 _DECIMALS = 12  # of theta and w
 _FINE = 1e-3  # reliabilities up to here would lose digits that count
-_SLACK = 1e-9  # tolerance for rounding at floor and ceil of jump bounds and at the ends of ranges
 
 MOST_WEIGHT: Final = 1e6  # greatest weight of a term of the energy
 NAME = re.compile(r"[a-z][a-z0-9_]{0,31}")
@@ -41,24 +39,15 @@ _NOT_TEXT = re.compile(r"[\x00-\x1f\x7f\ud800-\udfff]")  # would break a comment
 
 @dataclass(frozen=True)
 class Reading:
-    """How an instance was read from a drawing; not part of its content, files or hash.
+    """How an instance was read from a drawing or a mesh; not part of its content, files or hash.
 
     page: x, y, width and height of the page in the drawing's units, y down, None without one. warnings:
-    possible misreadings, one line each.
+    possible misreadings, one line each. edges: directed edges of a mesh with a stroke, (k,).
     """
 
     page: tuple[float, float, float, float] | None
     warnings: tuple[str, ...] = ()
-
-
-def _boolean_array(values: Any) -> Bools:
-    """The values as booleans. Raises InstanceError unless they are True and False, or 1 and 0."""
-    booleans = isinstance(values, np.ndarray) and values.dtype.kind == "b"
-    array = values if booleans else float_array(values, "mask", InstanceError)
-    mask: Bools = array != 0
-    if (array != mask).any():
-        raise InstanceError("mask holds something other than True and False")
-    return mask
+    edges: Ints | None = None
 
 
 def name_from_text(text: str, what: str = "sketch") -> str:
@@ -182,10 +171,10 @@ class Instance(Pictured):
         if corner.shape != (2,):
             raise InstanceError(f"origin has shape {corner.shape}; give two numbers, x and y")
         place = round_to_digits(corner[0]), round_to_digits(corner[1])
-        grid = Grid(_read_only(_boolean_array(mask)), round_to_digits(pixel_size), place)
+        grid = Grid(_read_only(boolean_array(mask)), round_to_digits(pixel_size), place)
         grid.check()
         pixels = whole_numbers(stroke_pixels, "stroke_pixels")
-        return cls(name, grid, _numbers_of_pixels(grid, pixels), theta, w, **more)
+        return cls(name, grid, grid.numbers_of(pixels), theta, w, **more)
 
     @classmethod
     def on_faces(cls, name: str, mesh: Mesh, stroke_faces: Any, theta: Any, w: Any, **more: Any) -> Instance:
@@ -333,7 +322,7 @@ class Instance(Pictured):
         if self.gauge == "strokes":
             return self.theta
         # 3 pi/4 has lost some digits.
-        beyond = self.theta >= 3 * QUARTER - _SLACK
+        beyond = self.theta >= 3 * QUARTER - SLACK
         return np.where(beyond, np.maximum(self.theta - np.pi, -QUARTER), self.theta)
 
     @cached_property
@@ -385,33 +374,6 @@ class Instance(Pictured):
     def p_max(self) -> Ints:
         """Greatest useful jump of each pair, shape (m,)."""
         return self._jump_range[1]
-
-    def moved(self, grid: Grid, origin: NDArray[Any]) -> Instance:
-        """Return the instance on another grid whose pixel k is the pixel origin[k] of this one.
-
-        Strokes and weights of pairs move with their pixels, and directions stay, unlike in a replacement of
-        the domain. Neighbours on the other grid have to be neighbours on this one. origin: (k,).
-        """
-        number = np.full(self.grid.size, -1, dtype=np.int32)
-        number[origin] = np.arange(len(origin), dtype=np.int32)
-        at, weights = number[self.stroke_index], self.pair_weights
-        order = np.argsort(at)[np.count_nonzero(at < 0) :]
-        if weights is not None:
-
-            def key(one: NDArray[Any], other: NDArray[Any]) -> Any:
-                return np.minimum(one, other) * np.int64(self.grid.size) + np.maximum(one, other)
-
-            keys, moved = key(self.grid.first, self.grid.second), key(origin[grid.first], origin[grid.second])
-            by_key = np.argsort(keys)
-            weights = weights[by_key[np.searchsorted(keys, moved, sorter=by_key)]]
-        return replace(
-            self,
-            domain=grid,
-            stroke_index=at[order],
-            theta=self.theta[order],
-            w=self.w[order],
-            pair_weights=weights,
-        )
 
     def with_gauge(self, gauge: Gauge) -> Instance:
         """Return the same instance under another gauge. Raises InstanceError for an unknown one."""
@@ -515,23 +477,6 @@ class Instance(Pictured):
         if self.pair_weights is not None:
             digest.update(self.pair_weights.astype("<f8").tobytes())
         return digest.hexdigest()
-
-
-def _numbers_of_pixels(grid: Grid, pixels: Ints) -> Ints:
-    """Number of each pixel [row, column], shape (s,). Raises InstanceError for one outside the mask."""
-    if pixels.size == 0:
-        return np.zeros(0, dtype=np.int32)
-    if pixels.ndim != 2 or pixels.shape[1] != 2:
-        raise InstanceError(
-            f"stroke_pixels has shape {pixels.shape}; give [row, column] for each stroke pixel"
-        )
-    number = grid.numbers_at(*pixels.T)
-    if (number < 0).any():
-        row, column = pixels[int(np.argmax(number < 0))]
-        raise InstanceError(
-            f"stroke pixel [{row}, {column}]: is outside the mask ({int((number < 0).sum())} in all)"
-        )
-    return number
 
 
 def _read_only(array: np.ndarray[Any, Any]) -> Any:

@@ -61,9 +61,12 @@ class Mesh(Domain):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
+    def __repr__(self) -> str:
+        return f"<Mesh: {len(self.faces)} faces, {len(self.vertices)} vertices>"
+
     def check(self) -> None:
         """Raise MeshError, with numbers of faces, unless the mesh is an oriented manifold of triangles."""
-        self._check_arrays()
+        self.check_arrays()
         longest = _length(self._sides).max(axis=1)
         _refuse(
             ~(2 * self.areas > _THINNEST * longest * longest),
@@ -71,6 +74,8 @@ class Mesh(Domain):
             "faces",
         )
         _, number, count = np.unique(self.edge_keys[0], return_inverse=True, return_counts=True)
+        if (count > 1).any() and self._is_one_sided():
+            raise MeshError("is one-sided, as a Moebius strip is: it cannot be oriented; cut it open")
         _refuse(
             (count[number] > 1).reshape(-1, 3).any(axis=1),
             "{} go along the same edge in the same direction: they are turned against their neighbours, or "
@@ -85,7 +90,26 @@ class Mesh(Domain):
                 "split it, so that each vertex has one fan of faces",
             )
 
-    def _check_arrays(self) -> None:
+    def _is_one_sided(self) -> bool:
+        """Whether neighbours disagree however faces are turned. False where an edge has more than two."""
+        from scipy.sparse import coo_array  # not needed by programs that only read and write files
+        from scipy.sparse.csgraph import connected_components
+
+        edge = np.minimum(*self.edge_keys)
+        order = np.argsort(edge, kind="stable")
+        same = edge[order][1:] == edge[order][:-1]
+        one, other = order[:-1][same], order[1:][same]
+        turned = self._edges[0][one] == self._edges[0][other]
+        # Two copies of each face, one turned, with the neighbours that agree with it.
+        ends = np.concatenate([one, one]) // 3, np.concatenate([other, other]) // 3
+        copies = np.repeat([0, self.size], len(one)), np.concatenate([turned, ~turned]) * self.size
+        shape = (2 * self.size, 2 * self.size)
+        graph = coo_array((np.ones(2 * len(one)), (ends[0] + copies[0], ends[1] + copies[1])), shape=shape)
+        part = connected_components(graph, directed=False)[1]
+        return not (same[1:] & same[:-1]).any() and bool((part[: self.size] == part[self.size :]).any())
+
+    def check_arrays(self) -> None:
+        """Raise MeshError for arrays of other shapes, vertices that do not exist, and infinite positions."""
         if self.vertices.ndim != 2 or self.vertices.shape[1] != 3 or self.faces.ndim != 2:
             raise MeshError("give vertices as (v, 3) and faces as (n, 3)")
         if not len(self.faces):
@@ -116,7 +140,7 @@ class Mesh(Domain):
         return start * len(self.vertices) + end, end * len(self.vertices) + start
 
     @cached_property
-    def _opposite(self) -> Ints:
+    def opposite(self) -> Ints:
         """The directed edge that is each one reversed, -1 at the boundary, (3 n,)."""
         key, reversed_key = self.edge_keys
         order = np.argsort(key, kind="stable")
@@ -127,7 +151,7 @@ class Mesh(Domain):
     def pair_edges(self) -> Ints:
         """The directed edge of each pair that its first face has, shape (m,)."""
         start, end = self._edges
-        return np.nonzero((self._opposite >= 0) & (start < end))[0].astype(np.int32)
+        return np.nonzero((self.opposite >= 0) & (start < end))[0].astype(np.int32)
 
     @cached_property
     def first(self) -> Ints:
@@ -137,7 +161,7 @@ class Mesh(Domain):
     @cached_property
     def second(self) -> Ints:
         """Face j of each pair, shape (m,)."""
-        return np.asarray(self._opposite[self.pair_edges] // np.int32(3))
+        return np.asarray(self.opposite[self.pair_edges] // np.int32(3))
 
     @property
     def pair_vertices(self) -> Ints:
@@ -147,7 +171,7 @@ class Mesh(Domain):
     @property
     def boundary(self) -> Ints:
         """The directed edges with a face on one side only, shape (b,): edge 3 f + k is in face f."""
-        return np.nonzero(self._opposite < 0)[0].astype(np.int32)
+        return np.nonzero(self.opposite < 0)[0].astype(np.int32)
 
     def edge_vertices(self, edges: Ints) -> Ints:
         """First and second vertex of directed edges, shape (k, 2)."""
@@ -262,7 +286,7 @@ class Mesh(Domain):
         while len(place):
             incoming = at - at % 3 + (at + 2) % 3
             steps.append(np.stack([incoming, place]))
-            at = self._opposite[incoming]
+            at = self.opposite[incoming]
             open_ = (at >= 0) & (at != begin[place])
             place, at = place[open_], at[open_]
         edges, places = np.concatenate(steps, axis=1)
@@ -276,7 +300,7 @@ class Mesh(Domain):
         pair_of = np.full(3 * self.size, -1, dtype=np.int32)
         pair_of[self.pair_edges] = np.arange(len(self.pair_edges), dtype=np.int32)
         forward = pair_of[crossed] >= 0
-        pair = np.where(forward, pair_of[crossed], pair_of[self._opposite[crossed]])
+        pair = np.where(forward, pair_of[crossed], pair_of[self.opposite[crossed]])
         start = np.searchsorted(ring, np.arange(len(self.ring_vertices) + 1)).astype(np.int32)
         sign = np.where(forward, 1, -1).astype(np.int32)
         return Rings(start, pair.astype(np.int32), sign, self.defect[self.ring_vertices])

@@ -12,10 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .angles import HALF
+from .angles import HALF, SLACK
 from .domain import Floats, Ints, Rings
-
-_SLACK = 1e-9  # quarter turns by which rounding may move the end of a range of jumps
 
 
 def parity_sign(p: Ints) -> Floats:
@@ -91,8 +89,8 @@ class PairTerms:
         For every A at jump 0 in its range, the best even and the best odd jump lie between the two.
         """
         least, greatest = self.range_a(lower, upper, 0)
-        p_min = np.floor(-2 * greatest / np.pi + _SLACK).astype(np.int32)
-        return p_min, np.ceil(-2 * least / np.pi - _SLACK).astype(np.int32)
+        p_min = np.floor(-2 * greatest / np.pi + SLACK).astype(np.int32)
+        return p_min, np.ceil(-2 * least / np.pi - SLACK).astype(np.int32)
 
     def select(self, pairs: NDArray[Any], number: Ints | None = None) -> PairTerms:
         """Some of the pairs, by their numbers or a mask, at points renumbered by `number` (n,)."""

@@ -90,7 +90,7 @@ def main() -> None:
         send(b"", answers)  # all imports are done: time limits count from here
         while True:
             task = tasks.get()
-            with _output_to(task.log):
+            with output_to(task.log):
                 answer = _answer(task.work)
             send(answer, answers)
 
@@ -149,8 +149,8 @@ def _with_traceback(error: Exception) -> Exception:
 
 
 @contextmanager
-def _output_to(log: Path | None) -> Iterator[None]:
-    """Redirect the output of the work to a file, including C libraries."""
+def output_to(log: Path | None) -> Iterator[None]:
+    """Redirect the output of this process to a file, including C libraries."""
     if log is None:
         yield
         return
@@ -167,8 +167,8 @@ def _output_to(log: Path | None) -> Iterator[None]:
 
 def _redirect(out: int, err: int) -> None:
     """Make descriptors 1 and 2 copies of others, after writing buffered output."""
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        stream.flush()
     with suppress(OSError, TypeError, AttributeError):  # elsewhere C libraries flush by themselves
         ctypes.CDLL(None).fflush(None)
     os.dup2(out, 1)

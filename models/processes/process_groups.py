@@ -15,7 +15,10 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from typing import Any, Final
 
-KILLED: Final = 1 if sys.platform == "win32" else -int(signal.SIGKILL)
+if sys.platform == "win32":
+    KILLED: Final = 1
+else:
+    KILLED: Final = -int(signal.SIGKILL)
 """Exit code of a killed process; on Windows other failures have it too."""
 
 
@@ -23,16 +26,17 @@ def start_group(command: Sequence[str], **options: Any) -> subprocess.Popen[Any]
     """Child process in a group of its own. `options` are the options of `subprocess.Popen`."""
     if sys.platform == "win32":
         return subprocess.Popen(command, creationflags=subprocess.CREATE_NEW_PROCESS_GROUP, **options)
-    return subprocess.Popen(command, start_new_session=True, **options)
+    else:  # noqa: RET505 - a type checker for Windows takes the lines after such a block for unreachable
+        return subprocess.Popen(command, start_new_session=True, **options)
 
 
 def kill_group(child: subprocess.Popen[Any]) -> None:
     """Kill a child of `start_group` with its group, even when the child itself has ended."""
     if sys.platform == "win32":
         child.kill()
-        return
-    with suppress(ProcessLookupError, PermissionError):  # macOS denies it where only ended processes are left
-        os.killpg(child.pid, signal.SIGKILL)
+    else:
+        with suppress(ProcessLookupError, PermissionError):  # macOS denies it if only ended ones are left
+            os.killpg(child.pid, signal.SIGKILL)
 
 
 def describe_exit(code: int) -> str:

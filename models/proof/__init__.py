@@ -15,11 +15,11 @@ over points, pairs and rings (`instance.domain`) would have these parts:
 - Shares: passes over the points in an order. The anti-diagonals of a grid may be visited by many threads; the
   general order is that of `orthogonal`.
 - Tables: on the alphas of a ring of any length. The quads of a grid are its rings.
-- Exclusion: min-marginals on forests. The combs of a grid are two forests.
+- Exclusion: min-marginals of pairs and rings; on a grid also those of two forests, its combs.
 - Last step: pieces with multipliers. The cases of `orthogonal` are pieces with a chosen jump at each open
   pair, and a tangent is one choice of multipliers.
 
-`descent/orthogonal.py`, `bound/orthogonal_dual.py` and `check_orthogonal.py` have nearly 1,300 lines; kappa,
+`descent/orthogonal.py`, `bound/orthogonal_dual.py` and `check_orthogonal.py` have nearly 1,400 lines; kappa,
 rings and the second rule of levels would add some 300 to the others. Skewed crosses on meshes, which have no
 proofs, would have them. The costs: passes over sketches lose their regular arrays, unless grids keep a path
 of their own, and the certificates that ship have to be made again in one format. The checker comes first,

@@ -62,7 +62,7 @@ def write_certificate(proof: Proof, path: str | Path, *, force: bool = False) ->
     InputError
         For a proof that the checker refuses, and for another suffix.
     SolverError
-        For a proof without levels.
+        For a proof without a bound.
     OutputError
         When the file cannot be written, or if another one is in the way.
 
@@ -70,7 +70,7 @@ def write_certificate(proof: Proof, path: str | Path, *, force: bool = False) ->
     path = Path(path)
     require_suffix(path, ".npz")
     check_targets(path.parent, [path.name], force=force)
-    if not proof.levels:
+    if not proof.has_bound:
         reason = proof.reason or "no level was completed"
         raise SolverError(f"is not written: nothing was proven, because {reason}", file=path)
     try:

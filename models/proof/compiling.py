@@ -16,13 +16,14 @@ from filelock import FileLock
 
 from ..errors import CrossfieldError, SolverError
 from ..instance.instance import Instance
+from ..instance.mesh import Mesh
 from ..processes.child import Child, KilledError
 from ..processes.child_program import WorkerError
 from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, IsOver, Progress, never, silent
 from ..search.greedy import greedy_field
 from ..storage import temporary_folder
-from .bound import orthogonal_dual
+from .bound import charges, orthogonal_dual
 from .bound.dual import Dual
 from .bound.lattice import Lattice
 from .bound.pruning import finer_lattice
@@ -80,8 +81,11 @@ def compile_all(orthogonal: bool) -> None:
         mask, w = np.ones((3, 3), dtype=bool), np.ones(4)
         instance = Instance.on_pixels("small", mask, corners, theta, w, orthogonal=orthogonal)
         if orthogonal:
-            ends = Termination(Deadline(), never, gap=0.0, work=math.inf)
-            prove_orthogonal(instance, None, ends, silent)
+            points, none = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float), np.zeros(0)
+            pyramid = Mesh(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32))
+            strokeless = Instance.on_faces("small", pyramid, none.astype(int), none, none, orthogonal=True)
+            for small in (instance, strokeless):  # the second has charges
+                prove_orthogonal(small, None, Termination(Deadline(), never, gap=0.0, work=math.inf), silent)
             return
         field = greedy_field(instance)
         with crew(1) as thread:
@@ -106,4 +110,6 @@ def _without_collection() -> Iterator[None]:
 
 def _is_compiled(orthogonal: bool) -> bool:
     """Whether the functions of one of the two kinds of proofs are; they are in separate modules."""
-    return is_all_compiled(lambda module: (module == orthogonal_dual.__name__) == orthogonal)
+    return is_all_compiled(
+        lambda module: (module in (charges.__name__, orthogonal_dual.__name__)) == orthogonal
+    )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..arguments import check_choice
 from ..errors import InputError
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
@@ -17,9 +19,10 @@ def samples() -> list[Sample]:
 
 
 def sample(
-    name: str,
+    sample_name: str,
     size: int | None = None,
     *,
+    name: str = "",
     gauge: Gauge = "strokes",
     stroke_weight: float = STROKE_WEIGHT,
     skew_weight: float = SKEW_WEIGHT,
@@ -29,10 +32,12 @@ def sample(
 
     Parameters
     ----------
-    name
-        A name in `samples()`.
+    sample_name
+        Name of a sample; `crossfield list` lists them.
     size
         Pixels on the longer side of the grid, 1 to 4096; 24 by default. A mesh has none.
+    name
+        Name of the instance, and so of its files; by default that of the sample.
     gauge
         Window of alpha, as in `Instance`.
     stroke_weight, skew_weight
@@ -50,13 +55,15 @@ def sample(
     InputError
         For an unknown name, and for a size out of range.
     InstanceError
-        For a weight out of range.
+        For a weight out of range, or a name that is not allowed.
 
     """
-    if name in MESHES:
+    if sample_name in MESHES:
         if size is not None or silhouette != "none":
-            raise InputError(f"{name} is a mesh with its own faces; leave size and silhouette out")
-        return mesh_sample(name, gauge, stroke_weight)
-    check_choice("sample", name, [*SAMPLES, *MESHES])
-    weights = {"stroke_weight": stroke_weight, "skew_weight": skew_weight}
-    return drawn_sample(name, size, gauge=gauge, silhouette=silhouette, **weights)
+            raise InputError(f"{sample_name} is a mesh with its own faces; leave size and silhouette out")
+        instance = mesh_sample(sample_name, gauge, stroke_weight)
+    else:
+        check_choice("sample", sample_name, [*SAMPLES, *MESHES])
+        weights = {"stroke_weight": stroke_weight, "skew_weight": skew_weight}
+        instance = drawn_sample(sample_name, size, gauge=gauge, silhouette=silhouette, **weights)
+    return replace(instance, name=name or sample_name)

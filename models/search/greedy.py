@@ -20,7 +20,7 @@ from ..instance.least_squares import residuals_at
 from ..instance.sparse_systems import SimilarSystems, solve_by_gradients
 from ..orthogonal.energy import takes_integers
 from ..processes.blas_threads import one_thread
-from ..processes.deadline import IsOver, Progress, Stop, never, silent, stop_function
+from ..processes.deadline import IsOver, Stop, never, stop_function
 from .box_qp import CLOSE, FreeField
 from .integer_fields import greedy_integer_field
 from .nearest_stroke import nearest_strokes
@@ -43,7 +43,7 @@ _ROUGH: Final = _Pace(0.5, 1e-2, 0.1)
 
 
 @one_thread()
-def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop | None = None) -> CrossField:
+def greedy_field(instance: Instance, *, stop: Stop | None = None) -> CrossField:
     """Greedy field of BendFields: the minimum 2-norm energy for its jumps, within all bounds.
 
     The jumps are decided one after the other, the cheapest first, as in BendFields (2015), where all angles
@@ -58,8 +58,6 @@ def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop 
     ----------
     instance
         The instance.
-    progress
-        Receives a line of text after every batch: the number of jumps that are decided.
     stop
         A function that returns whether to stop, or an event. All remaining jumps are then decided at once.
 
@@ -74,7 +72,7 @@ def greedy_field(instance: Instance, *, progress: Progress = silent, stop: Stop 
     state, nearest = _grow_cells(instance)
     pace = _CLOSE if instance.grid.size <= _CLOSE_UP_TO else _LARGE
     is_over = stop_function(stop)
-    _stitch(state, nearest, pace, is_over, progress)
+    _stitch(state, nearest, pace, is_over)
     return state.fit_in_bounds(is_over)
 
 
@@ -93,9 +91,7 @@ def _grow_cells(instance: Instance) -> tuple[FreeField, Ints]:
     return FreeField(instance, angle, np.zeros(len(angle)), jumps), nearest
 
 
-def _stitch(
-    state: FreeField, nearest: Ints, pace: _Pace, is_over: IsOver, progress: Progress = silent
-) -> None:
+def _stitch(state: FreeField, nearest: Ints, pace: _Pace, is_over: IsOver) -> None:
     """Decide the jumps between cells, cheapest first, in batches."""
     grid, solver = state.instance.grid, SimilarSystems()
     known = nearest[grid.first] == nearest[grid.second]
@@ -114,7 +110,6 @@ def _stitch(
         state.p[chosen] = jumps[chosen]
         known[chosen] = True
         _update_angles(state, known, solver, _LARGE.local if late else pace.local)
-        progress(f"{int(known.sum())} of {len(known)} jumps")
 
 
 def _update_angles(state: FreeField, known: Bools, solver: SimilarSystems, local: float | None) -> None:

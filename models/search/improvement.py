@@ -143,13 +143,6 @@ def _turn_trial(state: FreeField, quarters: Ints, solver: SimilarSystems) -> Fre
     return trial
 
 
-def pixel_curves(instance: Instance) -> Ints:
-    """The curve of each pixel, (n,); -1 without a stroke."""
-    curve = np.full(instance.grid.size, -1)
-    curve[instance.stroke_index] = stroke_curves(instance)
-    return curve
-
-
 def stroke_curves(instance: Instance) -> Ints:
     """The curve of each stroke pixel, (s,): neighbours of nearly the same direction belong together."""
     count = len(instance.theta)

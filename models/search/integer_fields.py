@@ -6,6 +6,8 @@ Then angles and best jumps alternate.
 
 from __future__ import annotations
 
+from typing import Final
+
 from ..field.field import CrossField
 from ..instance.domain import Ints
 from ..instance.instance import Instance
@@ -17,6 +19,8 @@ from ..smooth.polyvector import power_field
 from .box_qp import FreeField, fit_in_box
 from .improvement import settle
 
+_STEPS: Final = 30  # of the power field, where it is the first field
+
 
 def greedy_integer_field(instance: Instance, is_over: IsOver) -> CrossField:
     """The field of greedy rounding."""
@@ -25,12 +29,12 @@ def greedy_integer_field(instance: Instance, is_over: IsOver) -> CrossField:
 
 
 def first_integer_field(instance: Instance, is_over: IsOver) -> CrossField:
-    """The lower of the greedy and the power field after descent; of over 6,000 points, the power field."""
+    """The power field after 30 steps; of up to 6,000 points, the lowest of it and others after descent."""
     energy = OrthogonalEnergy.of(instance)
-    if energy.size > MOST_DENSE:
-        z = energy.nearest(power_field(instance).alpha)
-    else:
-        z = min(starting_integers(instance, energy, None, is_over), key=energy.least_total)
+    z = energy.nearest(power_field(instance, steps=_STEPS).alpha)
+    if energy.size <= MOST_DENSE:
+        starts = [*starting_integers(instance, energy, None, is_over), energy.descend(z, is_over)]
+        z = min(starts, key=energy.least_total)
     return finish_field(instance, energy, z, is_over)
 
 

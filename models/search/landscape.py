@@ -11,10 +11,6 @@ of the pair (i, j) of weight w that changes by d
 So the gain of every change of one jump is a short formula in off-diagonal entries of G, and making a change
 costs one update of G. Angles outside the patch stay as they are; the energy is the energy of the whole field.
 
-When the jumps of all pairs of a pixel change by one, its stroke passes from line u to line v. In the labels
-from before, only -W u^2 + W v^2 is added, with u = alpha + beta - theta and v = alpha - beta - theta -+ pi/2.
-So this gain is a formula in the entries of G at that pixel.
-
 Updates lose digits. Where the parities of all jumps fit together and every stroke has the same sign of beta,
 (alpha + c, beta -+ c) costs w_beta alone. Then H has an eigenvalue of about w_beta, and a jump that ends this
 state takes the difference of numbers as large as 1 / w_beta. So after every change the energy is computed
@@ -26,7 +22,6 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import cached_property
 from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
@@ -94,27 +89,6 @@ class Patch:
     def unknowns(self) -> Ints:
         """Places of the patch's angles in (alpha, beta), shape (2k,)."""
         return np.concatenate([self.pixels, self.pixels + self.instance.grid.size])
-
-    @cached_property
-    def strokes(self) -> Ints:
-        """Numbers of the strokes that lie inside with all pairs of their pixels, shape (t,)."""
-        grid, at = self.instance.grid, self.instance.stroke_index
-        number = np.full(grid.size, -1)
-        number[self.pixels] = np.arange(len(self.pixels))
-        pairs = self.instance.pair_terms.degree(grid.size)[at]
-        inside = self.terms.degree(len(self.pixels))
-        return np.flatnonzero((number[at] >= 0) & (inside[number[at]] == pairs)).astype(np.int32)
-
-    @cached_property
-    def stroke_pixels(self) -> Ints:
-        """Local numbers of their pixels, shape (t,)."""
-        return np.searchsorted(self.pixels, self.instance.stroke_index[self.strokes]).astype(np.int32)
-
-    def turn_steps(self, quarters: Ints) -> tuple[Ints, Ints]:
-        """The pairs, and the steps of their jumps, that turn the labels of pixels by quarters (k,)."""
-        steps = quarters[self.terms.first] - quarters[self.terms.second]
-        pairs = np.nonzero(steps)[0].astype(np.int32)
-        return pairs, steps[pairs]
 
 
 class Landscape:
@@ -218,32 +192,6 @@ class Landscape:
     def step(self, row: int, place: int) -> None:
         """Make the step with these numbers in `gains`."""
         self.change(np.array([place]), STEPS[[row]])
-
-    def turn_gains(self) -> Floats:
-        """Change of the energy when one stroke passes to line v by the shorter turn, (t,); inf if unknown."""
-        instance, g, at = self.patch.instance, self._inverse, self.patch.stroke_pixels
-        beta_at, (off, side) = at + len(self.patch.pixels), self._shorter_turns()
-        alphas, betas, mixed = g[at, at], g[beta_at, beta_at], 2 * g[at, beta_at]
-        u, v = off + self._x[beta_at], off - HALF * side - self._x[beta_at]
-        with np.errstate(all="ignore"):
-            beside = 1 / (instance.stroke_coefficient * instance.w[self.patch.strokes])
-            first, second = alphas + betas + mixed - beside, alphas + betas - mixed + beside
-            both = alphas - betas
-            gains: Floats = (second * u * u - 2 * both * u * v + first * v * v) / (first * second - both**2)
-            believed = np.isfinite(gains) & (first < 0) & (gains >= -self.energy * (1 + _DRIFT) - _DRIFT)
-        gains[~believed] = np.inf
-        return gains
-
-    def _shorter_turns(self) -> tuple[Floats, Ints]:
-        """Offsets alpha - theta of the patch's strokes, and the directions of the shorter turns, (t,)."""
-        off = self._x[self.patch.stroke_pixels] - self.patch.instance.target[self.patch.strokes]
-        return off, np.where(off < 0, -1, 1).astype(np.int32)
-
-    def turn(self, stroke: int) -> None:
-        """Let line v carry the stroke with this place in `turn_gains`, by the shorter turn."""
-        quarters = np.zeros(len(self.patch.pixels), dtype=np.int32)
-        quarters[self.patch.stroke_pixels[stroke]] = self._shorter_turns()[1][stroke]
-        self.change(*self.patch.turn_steps(quarters))
 
     def change(self, pairs: Ints, steps: Ints) -> None:
         """Add steps (c,) to the jumps of the patch's pairs with those local numbers, each at most once."""

@@ -37,17 +37,6 @@ def reproducible_field(field: CrossField) -> CrossField:
 
     Within the bounds that `fit_in_box` keeps. Parts of the mask without strokes keep the angles from there,
     also rounded.
-
-    Parameters
-    ----------
-    field : CrossField
-        Jumps, and angles from which the search for the best ones starts.
-
-    Returns
-    -------
-    CrossField
-        The same jumps with their best angles.
-
     """
     instance, start = field.instance, fit_in_box(field)
     lower, upper = angle_bounds(instance)

@@ -28,7 +28,7 @@ from ..processes.process_groups import catch_interrupts
 from ..processes.process_pool import parallel_map
 from ..smooth.polyvector import power_field
 from .box_qp import FreeField, stroke_bounds
-from .improvement import pixel_curves, settle
+from .improvement import settle
 from .integer_fields import finish_field, have_energies_of_fields, starting_integers
 from .integer_search import IntegerSearch
 from .landscape import FieldPoint
@@ -240,7 +240,6 @@ class _Hunt:
         self._bounds = stroke_bounds(instance)
         self._solver = SimilarSystems()
         self._unsettled = False
-        self._curve = pixel_curves(instance)
 
     def best(self, is_over: IsOver) -> CrossField:
         """The field of least energy so far."""
@@ -273,11 +272,10 @@ class _Hunt:
     def tasks(self, deadline: Deadline) -> list[PatchTask]:
         """The tasks of this round, with their deadline."""
         rng = np.random.default_rng((self._seed, self.round))
-        curve, seed = self._curve, (self._seed, self.round)
-        patches = enumerate(zip(self._states_to_explore(), self._patches(rng), strict=True))
+        patches = zip(self._states_to_explore(), self._patches(rng), strict=True)
         return [
-            PatchTask(self._instance, at.x, at.p, free, curve, _KICKS, (*seed, number), deadline)
-            for number, (at, free) in patches
+            PatchTask(self._instance, at.x, at.p, free, _KICKS, (self._seed, self.round, number), deadline)
+            for number, (at, free) in enumerate(patches)
         ]
 
     def _states_to_explore(self) -> list[FreeField]:

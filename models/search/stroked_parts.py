@@ -7,12 +7,15 @@ beta is 0. So the optimum is that of the other parts, and a lower bound of their
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.csgraph import connected_components
 
 from ..field.field import CrossField
+from ..instance.grid import Grid
 from ..instance.instance import Instance
 
 
@@ -24,7 +27,7 @@ def stroked_parts(instance: Instance) -> Instance:
     kept = np.isin(part, part[instance.stroke_index])
     mask = np.zeros_like(grid.mask)
     mask[grid.rows[kept], grid.columns[kept]] = True
-    return instance.moved(replace(grid, mask=mask), np.nonzero(kept)[0])
+    return move_to_grid(instance, replace(grid, mask=mask), np.nonzero(kept)[0])
 
 
 def restricted(field: CrossField, part: Instance) -> CrossField:
@@ -42,3 +45,32 @@ def extended(field: CrossField, instance: Instance) -> CrossField:
     jumps = np.zeros(len(instance.grid.first), np.int32)
     jumps[held[instance.grid.first]] = field.p
     return CrossField(instance, alpha, beta, jumps)
+
+
+def move_to_grid(instance: Instance, grid: Grid, origin: NDArray[Any]) -> Instance:
+    """The instance on another grid whose pixel k is the pixel origin[k] of this one.
+
+    Strokes and weights of pairs move with their pixels, and directions stay, unlike in a replacement of the
+    domain. Neighbours on the other grid have to be neighbours on this one. origin: (k,).
+    """
+    before = instance.grid
+    number = np.full(before.size, -1, dtype=np.int32)
+    number[origin] = np.arange(len(origin), dtype=np.int32)
+    at, weights = number[instance.stroke_index], instance.pair_weights
+    order = np.argsort(at)[np.count_nonzero(at < 0) :]
+    if weights is not None:
+        ends = [
+            np.sort([before.first, before.second], axis=0),
+            np.sort([origin[grid.first], origin[grid.second]], axis=0),
+        ]
+        keys, moved_keys = (low * np.int64(before.size) + high for low, high in ends)
+        by_key = np.argsort(keys)
+        weights = weights[by_key[np.searchsorted(keys, moved_keys, sorter=by_key)]]
+    return replace(
+        instance,
+        domain=grid,
+        stroke_index=at[order],
+        theta=instance.theta[order],
+        w=instance.w[order],
+        pair_weights=weights,
+    )

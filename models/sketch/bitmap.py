@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import io
 import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final
@@ -22,7 +21,7 @@ from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.domain import Bools, Floats
 from .colour import REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
-from .paper import Ink, reduce_pixels, relative_to_paper
+from .paper import Ink, relative_to_paper
 from .sheet import SIDE, PhotographedSheet, find_sheet
 
 FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
@@ -33,7 +32,6 @@ _MOST_INK: Final = 0.5  # of the picture; strokes leave more paper
 _FAINTEST: Final = 0.08  # contrast below which a picture is empty paper
 _NOISE, _FULL = 0.15, 0.85  # of the strokes' ink: below it noise of paper and compression, above it full
 _WHITE: Final = 65535.0  # of greys with 16 bits
-_BAND: Final = 1 << 20  # pixels of a picture that are processed together
 _BLUR: Final = 1.0  # pixels, of the gradient
 _CORE: Final = 0.8  # least ink in the core of a stroke
 _SPECK: Final = 4.0  # ink in pixels of the smallest mark that is not dust
@@ -201,9 +199,8 @@ def read_bitmap(data: bytes, size: int) -> Bitmap:
 
 def read_white_pixels(data: bytes) -> Bools:
     """The white part of a mask picture, bool [h, w]. Raises InputError like read_bitmap."""
-    image = _open_image(data)
-    bands = [pixels.mean(axis=-1, dtype=np.float32) >= 127.5 for pixels in _split_into_bands(image, 1)]
-    return np.concatenate(bands)
+    pixels = _reduce_image(_open_image(data), 1)
+    return np.asarray(pixels.sum(axis=-1, dtype=np.uint16) >= 127.5 * pixels.shape[-1])
 
 
 def _open_image(data: bytes) -> Any:
@@ -236,37 +233,22 @@ def _check_size(width: int, height: int) -> None:
         )
 
 
-def _split_into_bands(image: Any, multiple: int) -> Iterator[NDArray[np.uint8]]:
-    """The picture on white, uint8 [h, w, 1 or 3], from top to bottom in bands of whole multiples of rows."""
-    # Colours of all pixels at once would take many times the memory of the picture.
-    width, height = image.size
-    rows = max(1, _BAND // (width * multiple)) * multiple
-    bands = [(0, top, width, min(top + rows, height)) for top in range(0, height, rows)]
-    if image.mode == "F":
-        raise InputError("holds greys in floating point; save it with 8 or 16 bits")
-    white = _WHITE if image.mode.startswith("I") else None
-    return (_as_eight_bit(image.crop(band), white) for band in bands)
-
-
-def _as_eight_bit(image: Any, white: float | None) -> NDArray[np.uint8]:
-    """The picture on white as uint8 [h, w, 1 or 3]; greys up to `white` are scaled down."""
+def _reduce_image(image: Any, factor: int) -> NDArray[np.uint8]:
+    """The picture on white as uint8 [h, w, 1 or 3], reduced by a factor."""
     from PIL import Image
 
-    if white is not None:
-        values = np.asarray(image).astype(np.float32)
-        scaled: NDArray[np.uint8] = (255 * np.clip(values / white, 0, 1)).astype(np.uint8)
-        return scaled[..., None]
-    if "A" in image.getbands() or "transparency" in image.info:
-        image = image.convert("RGBA")
-        image = Image.alpha_composite(Image.new("RGBA", image.size, "white"), image)
-    image = image.convert("L" if image.mode in ("1", "L") else "RGB")
-    pixels: NDArray[np.uint8] = np.asarray(image)
-    return pixels[..., None] if pixels.ndim == 2 else pixels
-
-
-def _reduce_image(image: Any, factor: int) -> NDArray[np.uint8]:
-    """The picture as uint8 [h, w, 1 or 3], reduced by a factor."""
-    return np.concatenate([reduce_pixels(band, factor) for band in _split_into_bands(image, factor)])
+    if image.mode == "F":
+        raise InputError("holds greys in floating point; save it with 8 or 16 bits")
+    if image.mode.startswith("I"):
+        greys = np.asarray(image).astype(np.float32)
+        image = Image.fromarray((255 * np.clip(greys / _WHITE, 0, 1)).astype(np.uint8))
+    has_alpha = "A" in image.getbands() or "transparency" in image.info
+    mode = "RGBA" if has_alpha else "L" if image.mode in ("1", "L") else "RGB"
+    image = image if image.mode == mode else image.convert(mode)
+    image = image.reduce(factor) if factor > 1 else image
+    if has_alpha:
+        image = Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")
+    return np.asarray(image).reshape(*image.size[::-1], -1)
 
 
 def _find_specks(ink: Ink, width: float) -> Bools:

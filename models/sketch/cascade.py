@@ -11,9 +11,11 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
-from itertools import pairwise
+from itertools import groupby
 from typing import Any, Final
 from xml.etree.ElementTree import Element
+
+import numpy as np
 
 from ..errors import InputError
 from ..input_limits import MAX_LENGTH, MAX_RULE_CHECKS, MAX_STYLE
@@ -30,11 +32,6 @@ _KEYWORDS: Final = frozenset({"none", "currentcolor", "inherit", "context-fill",
 _INITIAL: Final = {"stroke": "none"}  # black for the others
 UNSHOWN: Final = re.compile(r"filter|marker|stroke-dash|mix-blend|isolation|font|animation|transition|-")
 """Beginnings of properties that the pictures of a drawing do without."""
-_UNUSED: Final = re.compile(
-    r"(?:clip-path|mask|mask-image):(?!url\(|none|inherit|initial)|transform-box:(?!view-box)"
-    r"|(?:rotate|scale|translate|offset-path):(?!none)"
-)
-"""Declarations of places and clips that neither this package nor resvg knows."""
 _LIGHT: Final = re.compile(r"light-dark\(\s*((?:[^(),]|\([^()]*\))*),.*\)", re.DOTALL)
 _VARIABLE: Final = re.compile(r"var\(\s*(--[\w-]+)\s*(?:,\s*((?:[^()]|\([^()]*\))*))?\)")
 _DEEPEST: Final = 10  # variables inside of variables
@@ -48,14 +45,12 @@ class Cascade:
     """The rules of a drawing.
 
     combinators: of each selector, by its order, how often it tries all ancestors and all siblings. unread: an
-    element and its colour, for each colour that cannot be read. unused: the same for declarations that change
-    what the element shows and that neither this package nor the renderer knows.
+    element and its colour, for each colour that cannot be read.
     """
 
     matcher: Any
     combinators: dict[int, tuple[int, int]] = field(default_factory=dict)
     unread: dict[Element, str] = field(default_factory=dict)
-    unused: dict[Element, str] = field(default_factory=dict)
     checks: int = 0
 
     def declare(self, root: Element) -> dict[Element, dict[str, str]]:
@@ -117,8 +112,6 @@ class Cascade:
                     self.unread[element] = text
                     continue
                 value = colour
-            if _UNUSED.match(f"{name}:{value}"):
-                self.unused[element] = f"{name}: {value}"
             style[name] = value
         return style
 
@@ -157,13 +150,13 @@ def _add_rules(cascade: Cascade, rules: Iterable[Any]) -> None:
                 selectors = cssselect2.compile_selector_list(rule.prelude)
             except (cssselect2.SelectorError, RecursionError, MemoryError, SyntaxError):
                 continue
-            commas = [place for place, part in enumerate(rule.prelude) if part == ","]
-            for selector, (start, end) in zip(
-                selectors, pairwise([-1, *commas, len(rule.prelude)]), strict=True
-            ):
+            # A comma in parentheses is part of a selector, whose combinators multiply.
+            lists = groupby(rule.prelude, lambda part: part == ",")
+            parts = [_combinators(_text(list(part))) for is_comma, part in lists if not is_comma]
+            bounds = np.max(parts, axis=0)
+            for selector in selectors:
                 cascade.matcher.add_selector(selector, declared)
-                text = _text(rule.prelude[start + 1 : end])
-                cascade.combinators[cascade.matcher.order] = _combinators(text)
+                cascade.combinators[cascade.matcher.order] = tuple(bounds.tolist())
 
 
 def _combinators(selector: str) -> tuple[int, int]:

@@ -13,28 +13,12 @@ from ..instance.domain import Bools, Floats
 PAPER: Final = 0.1  # ink below this counts as paper
 REDDISH: Final = 0.4  # least share of a stroke's ink that must be missing from green and blue alone
 
-# From CSS Color Module Level 4, section 18 (sample code), for white at D65.
-_OKLAB_TO_LMS: Final = [
-    [1, 0.3963377774, 0.2158037573],
-    [1, -0.1055613458, -0.0638541728],
-    [1, -0.0894841775, -1.2914855480],
-]
-_LMS_TO_SRGB: Final = [
-    [4.0767416621, -3.3077115913, 0.2309699292],
-    [-1.2684380046, 2.6097574011, -0.3413193965],
-    [-0.0041960863, -0.7034186147, 1.7076147010],
-]
-_XYZ50_TO_SRGB: Final = [
-    [3.1341358, -1.6173863, -0.4906624],
-    [-0.9787955, 1.9162544, 0.0334429],
-    [0.0719554, -0.2289768, 1.4053861],
-]
+# From CSS Color Module Level 4, section 18 (sample code).
 _P3_TO_SRGB: Final = [
     [1.2249402, -0.2249402, 0],
     [-0.0420570, 1.0420570, 0],
     [-0.0196376, -0.0786361, 1.0982735],
 ]
-_D50: Final = np.array([0.96422, 1.0, 0.82521])
 
 
 def ink_of(rgb: Floats) -> Floats:
@@ -69,27 +53,12 @@ def hex_colour(text: str) -> str | None:
 
 
 def _srgb_channels(colour: Any) -> Any:
-    """Red, green and blue in [0, 1] of a parsed colour; None for spaces of film and print."""
-    first, second, third = (0.0 if value is None else value for value in colour.coordinates)
+    """Red, green and blue in [0, 1] of a parsed colour; None for spaces that no drawing program writes."""
     if colour.space in ("srgb", "hsl", "hwb"):
         return colour.to("srgb").coordinates
-    if colour.space in ("lch", "oklch"):
-        angle = np.radians(third)
-        second, third = second * np.cos(angle), second * np.sin(angle)
-    values = np.array([first, second, third])
-    if colour.space in ("oklab", "oklch"):
-        return _gamma(np.array(_LMS_TO_SRGB) @ (np.array(_OKLAB_TO_LMS) @ values) ** 3)
-    if colour.space in ("lab", "lch"):
-        f = (first + 16) / 116 + np.array([second / 500, 0, -third / 200])
-        xyz = _D50 * np.where(f > 6 / 29, f**3, (116 * f - 16) * 27 / 24389)
-        return _gamma(np.array(_XYZ50_TO_SRGB) @ xyz)
-    if colour.space == "display-p3":
-        linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
-        return _gamma(np.array(_P3_TO_SRGB) @ linear)
-    return _gamma(values) if colour.space == "srgb-linear" else None
-
-
-def _gamma(linear: Floats) -> Floats:
-    """Linear channels in the encoding of sRGB."""
-    linear = np.clip(linear, 0, 1)
+    if colour.space != "display-p3":
+        return None
+    values = np.array([0.0 if value is None else value for value in colour.coordinates])
+    linear = np.where(values <= 0.04045, values / 12.92, ((values + 0.055) / 1.055) ** 2.4)
+    linear = np.clip(np.array(_P3_TO_SRGB) @ linear, 0, 1)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)

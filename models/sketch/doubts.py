@@ -6,14 +6,13 @@ from typing import Final
 
 import numpy as np
 
-from ..instance.domain import Bools, Floats
-from .cover import Box, Frame
+from ..instance.domain import Bools
+from .cover import Frame
 from .outline import THICK
 
 BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
 CROWDED: Final = 0.1  # least share of the solved pixels in blocks filled by strokes that causes a warning
 LOOSE: Final = 0.08  # least share of stroke pixels that bound nothing, which causes a warning
-OFF: Final = 0.01  # least share of the solved pixels more than a pixel off the page that causes a warning
 
 
 def describe_open_drawing(region: Bools) -> str | None:
@@ -57,28 +56,7 @@ def describe_crowding(filled: Bools, mask: Bools, frame: Frame) -> str | None:
     )
 
 
-def describe_off_page(mask: Bools, frame: Frame, page: Box | None) -> str | None:
-    """Pixels of a mask that lie off the page (x, y, width, height) of the drawing."""
-    if page is None:
-        return None
-    inside = []
-    for edges, start, side in zip(frame.edges, page[1::-1], page[:1:-1], strict=True):
-        middle = (edges[:-1] + edges[1:]) / 2
-        inside.append((middle >= start - frame.pixel) & (middle <= start + side + frame.pixel))
-    off = 1 - mask[np.ix_(*inside)].sum() / mask.sum()
-    if off < OFF:
-        return None
-    return f"{off:.0%} of the pixels to solve for lie off the page, where no mask reaches; enlarge the page"
-
-
 def _describe_middle(pixels: Bools, frame: Frame) -> str:
     """The middle of some pixels as text."""
-    row, column = np.nonzero(pixels)
-    return _describe_point(
-        np.array([frame.x, frame.y]) + frame.pixel * (np.array([column.mean(), row.mean()]) + 0.5)
-    )
-
-
-def _describe_point(point: Floats) -> str:
-    """A point (x, y) as text."""
-    return f"({point[0]:.4g}, {point[1]:.4g})"
+    row, column = (frame.pixel * (places.mean() + 0.5) for places in np.nonzero(pixels))
+    return f"({frame.x + column:.4g}, {frame.y + row:.4g})"

@@ -15,6 +15,7 @@ from functools import cached_property
 from typing import Final
 
 from ..errors import InputError, shortened
+from .colour import hex_colour
 
 LABEL_KINDS: Final = ("colour", "class", "id", "layer", "cluster")
 _FEW: Final = 4  # labels of each kind that an error lists
@@ -26,36 +27,30 @@ _NUMBERED: Final = re.compile(r" \d+ $")  # the second layer of a name is `Flow_
 
 @dataclass(eq=False)
 class LabelMatcher:
-    """A matcher of labels while a drawing is read. seen: a few labels of each kind that the drawing has."""
+    """A matcher of labels while a drawing is read. seen: the labels of the drawing, by what is compared."""
 
     wanted: frozenset[str]
-    matched: set[str] = field(default_factory=set)
-    seen: dict[str, list[str]] = field(default_factory=lambda: {kind: [] for kind in LABEL_KINDS})
+    seen: dict[str, str] = field(default_factory=dict)
 
     def matches(self, labels: Iterable[str]) -> bool:
         """Whether one of the labels is wanted; all of them are recorded."""
-        wanted = False
-        for label in labels:
-            listed = self.seen[label.partition("=")[0]]
-            as_id = label.replace("layer=", "id=", 1)  # of a group that has only an id
-            if len(listed) < _FEW and not {label, as_id} & {*listed, *self.seen["id"]}:
-                listed.append(label)
-            matched = self._wanted_by_key.get(_key_of(label), ())
-            self.matched.update(matched)
-            wanted = wanted or bool(matched)
-        return wanted
+        by_key = {_key_of(label): label for label in labels}
+        for key, label in by_key.items():
+            self.seen.setdefault(key, label)
+        return not self._keys.isdisjoint(by_key)
 
     @cached_property
-    def _wanted_by_key(self) -> dict[str, list[str]]:
-        keys: dict[str, list[str]] = {}
-        for label in self.wanted:
-            keys.setdefault(_key_of(label), []).append(label)
-        return keys
+    def _keys(self) -> set[str]:
+        return set(map(_key_of, self.wanted))
 
     def check(self, *, any_stroke: bool) -> None:
         """Raise InputError if a wanted label is missing, or if no stroke has one."""
-        if missing := sorted(self.wanted - self.matched):
-            there = [shortened(label, 40) for labels in self.seen.values() for label in labels]
+        if missing := sorted(label for label in self.wanted if _key_of(label) not in self.seen):
+            there = [
+                shortened(label, 40)
+                for kind in LABEL_KINDS
+                for label in [*filter(lambda one: one.startswith(f"{kind}="), self.seen.values())][:_FEW]
+            ]
             listed = f"it has {', '.join(there)}" if there else "its strokes have no labels at all"
             raise InputError(f"has no stroke of {shortened(missing[0])}; {listed}")
         if not any_stroke:
@@ -71,7 +66,12 @@ def label_of(selector: str) -> str:
             f"{shortened(selector)!r} chooses no strokes; "
             "write colour=red, class=flow, id=group2, layer=Flow or cluster=3"
         )
-    return _named_colour(value) if kind == "colour" else f"{kind}={value}"
+    if kind != "colour":
+        return f"{kind}={value}"
+    colour = hex_colour(value)
+    if colour is None:
+        raise InputError(f"{shortened(value)!r} is not a colour; write a name or #rrggbb")
+    return f"colour={colour[:7]}"
 
 
 def labels_of(tag: str, attributes: Mapping[str, str]) -> Iterator[str]:
@@ -106,14 +106,3 @@ def _key_of(label: str) -> str:
 def colour_label(rgb: tuple[float, float, float]) -> str:
     """The label of a colour given as red, green, blue in [0, 1]."""
     return "colour=#" + "".join(f"{round(255 * channel):02x}" for channel in rgb)
-
-
-def _named_colour(colour: str) -> str:
-    """The label of a colour by its name or CSS notation. Raises InputError for other text."""
-    from PIL import ImageColor
-
-    try:
-        red, green, blue = (min(channel, 255) / 255 for channel in ImageColor.getrgb(colour)[:3])
-    except ValueError as error:
-        raise InputError(f"{shortened(colour)!r} is not a colour; write a name or #rrggbb") from error
-    return colour_label((red, green, blue))

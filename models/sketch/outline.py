@@ -42,30 +42,14 @@ def drop_narrow_parts(region: Bools, least: int) -> Bools:
 
 
 def convex_area(pixels: Bools) -> float:
-    """The area of the convex hull of some pixels.
+    """The area of the convex hull of some pixels."""
+    from scipy.spatial import ConvexHull
 
-    Importing SciPy's hulls takes longer than reading a drawing.
-    """
     rows = np.flatnonzero(pixels.any(axis=1))
-    borders = np.ravel([rows, rows + 1], order="F").tolist()
-    margins = 0.0
-    for side in (pixels[rows], pixels[rows, ::-1]):
-        margins -= _area_below_hull(borders, (-side.argmax(axis=1).repeat(2)).tolist())
-    return float((borders[-1] - borders[0]) * pixels.shape[1] - margins)
-
-
-def _area_below_hull(places: list[int], heights: list[int]) -> float:
-    """The area below the upper convex hull of points with ascending places."""
-    hull: list[tuple[int, int]] = []
-    for x, y in sorted(zip(places, heights, strict=True)):
-        while len(hull) > 1:
-            (x0, y0), (x1, y1) = hull[-2:]
-            if (x1 - x0) * (y - y0) < (y1 - y0) * (x - x0):
-                break
-            hull.pop()
-        hull.append((x, y))
-    along, above = np.transpose(hull)
-    return float(np.trapezoid(above, along))
+    first = pixels[rows].argmax(axis=1)
+    last = pixels.shape[1] - pixels[rows, ::-1].argmax(axis=1)
+    corners = [np.stack([rows + down, side], axis=1) for down in (0, 1) for side in (first, last)]
+    return float(ConvexHull(np.concatenate(corners)).volume)
 
 
 def keep_parts_with_strokes(region: Bools, weight: Floats) -> Bools:

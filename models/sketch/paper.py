@@ -132,11 +132,7 @@ def _estimate_light(colours: Floats) -> Ink:
     coarse = block_means(colours.mean(axis=-1), rows, columns)
     closed = ndimage.grey_closing(coarse, size=int(_SHADOW * max(coarse.shape)) | 1, mode="nearest")
     smooth = ndimage.gaussian_filter(np.maximum(closed, _DARKEST_SHADOW), 1.0, mode="nearest")
-    places = [
-        np.interp(np.arange(side) + 0.5, (edges[:-1] + edges[1:]) / 2, np.arange(len(edges) - 1.0))
-        for side, edges in ((height, rows), (width, columns))
-    ]
-    return _interpolate_rows(_interpolate_rows(smooth.astype(np.float32), places[0]).T, places[1]).T
+    return _enlarge(smooth, colours.shape[:2])
 
 
 def _enlarge(blocks: Floats | Ink, shape: tuple[int, ...]) -> Ink:
@@ -147,11 +143,3 @@ def _enlarge(blocks: Floats | Ink, shape: tuple[int, ...]) -> Ink:
         (shape[1], shape[0]), Image.Resampling.BILINEAR
     )
     return np.asarray(enlarged)
-
-
-def _interpolate_rows(rows: Ink, place: Floats) -> Ink:
-    """Rows at fractional places, interpolated linearly between the rows of an array."""
-    below = np.minimum(place.astype(np.intp), max(len(rows) - 2, 0))
-    above = np.minimum(below + 1, len(rows) - 1)
-    part = (place - below).astype(np.float32)[:, None]
-    return np.asarray(rows[below] * (1 - part) + rows[above] * part)

@@ -1,15 +1,12 @@
 """The outlines of SVG shapes: path data, point lists and basic shapes as straight lines and cubic Beziers.
 
-svgelements parses path data, arcs and basic shapes. Its own paths take time that grows with the square of
-their length, so its lexer draws on an outline of this module.
+svgelements parses path data, arcs and basic shapes.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import SimpleNamespace
 from typing import Any, Final
 
 import numpy as np
@@ -35,8 +32,7 @@ _QUOTED: Final = 20  # characters of faulty data that are quoted
 _ALIEN: Final = re.compile(r"[^-+.\d\seE,]")  # in a list of points
 _NUMBER: Final = re.compile(r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?")
 
-_Coordinates = tuple[float, float] | str
-"""A point, or the letter that closes the subpath in place of its last point."""
+_Cubics = list[tuple[complex, complex, complex, complex]]
 
 
 def shape_curves(
@@ -49,13 +45,16 @@ def shape_curves(
     """
     if tag in ("polyline", "polygon"):
         return _polygon_lines(attributes.get("points", ""), closed=tag == "polygon")
-    drawn = _PathBuilder()
     with np.errstate(over="ignore", invalid="ignore"):  # left out when placed
         if tag == "path":
-            fault = _trace_path(attributes.get("d", ""), drawn)
+            cubics, fault = _parse_path(attributes.get("d", ""))
         else:
-            fault = _trace_basic(tag, attributes, page, drawn)
-        return drawn.points(), fault
+            cubics, fault = _parse_basic(tag, attributes, page)
+        values = np.array(cubics).reshape(-1, 4)
+        points: Floats = np.stack([values.real, values.imag], axis=-1)
+        straight = (values[:, 0] == values[:, 1]) & (values[:, 2] == values[:, 3])
+        points[straight] = lines_as_cubics(points[straight, 0], points[straight, 3])
+    return points, fault
 
 
 def length_in_pixels(text: str) -> float | None:
@@ -71,23 +70,81 @@ def length_in_pixels(text: str) -> float | None:
     return value if isinstance(value, float) and np.isfinite(value) else None
 
 
-def _trace_path(data: str, drawn: _PathBuilder) -> str | None:
-    """Draw path data as far as it can be read, and return what is faulty in it."""
+def _parse_path(data: str) -> tuple[_Cubics, str | None]:
+    """The cubics of path data as far as it can be read, and what is faulty in it."""
     from svgelements import SVGLexicalParser
 
-    data = data.strip()
+    data, path = data.strip(), _empty_path()
     if data in ("", "none"):
-        return None
+        return [], None
     if data[0] not in "Mm":
-        return f"its path data begins with {shortened(data, _QUOTED)!r}, not with a move (M)"
+        return [], f"its path data begins with {shortened(data, _QUOTED)!r}, not with a move (M)"
     lexer = SVGLexicalParser()
     try:
-        lexer.parse(drawn, data)
+        lexer.parse(path, data)
     except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError):
         lexer.pos = min(lexer.pos, len(data) - 1)
     if lexer.pos == len(data):
-        return None
-    return f"its path data is faulty near {shortened(data[max(lexer.pos - 9, 0) :], _QUOTED)!r}"
+        return path.cubics, None
+    return path.cubics, f"its path data is faulty near {shortened(data[max(lexer.pos - 9, 0) :], _QUOTED)!r}"
+
+
+def _empty_path() -> Any:
+    """A path of svgelements for its lexer, without checks whose time grows with the square of its length."""
+    from svgelements import CubicBezier, Move, Path, QuadraticBezier
+
+    class CubicPath(Path):  # type: ignore[misc]
+        z_point = None
+        cubics: _Cubics
+
+        def append(self, value: Any) -> None:
+            if len(self.cubics) >= MAX_CURVES:
+                raise too_many_curves()
+            self.cubics += _cubics_of(value)
+            self._segments[:] = [value]
+            if isinstance(value, Move):
+                self.z_point = value.end
+
+        def smooth_quad(self, *points: Any, **options: Any) -> None:
+            self.quad(self._reflected_control(QuadraticBezier), *points, **options)
+
+        def smooth_cubic(self, *points: Any, **options: Any) -> None:
+            self.cubic(self._reflected_control(CubicBezier), *points, **options)
+
+        def _reflected_control(self, kind: type) -> Any:
+            # svgelements also reflects those of the other kind, unlike SVG.
+            return self.smooth_point if isinstance(self._segments[-1], kind) else self.current_point
+
+        def arc(self, rx: float, ry: float, *others: Any, **options: Any) -> None:
+            rotation, large, sweep, end = others
+            if None in (large, sweep):
+                raise ValueError("a flag of an arc is neither 0 nor 1")
+            if rx == 0 or ry == 0:  # as in SVG
+                self.line(end)
+            else:
+                super().arc(rx, ry, rotation, large, sweep, end, **options)
+
+    path = CubicPath()
+    path.cubics = []
+    return path
+
+
+def _cubics_of(segment: Any) -> _Cubics:
+    """Control points of a segment of svgelements; those of a straight line are its ends."""
+    import svgelements
+
+    if isinstance(segment, svgelements.Move):
+        return []
+    if isinstance(segment, svgelements.Arc):
+        curves = segment.as_cubic_curves() if segment.start != segment.end else ()
+        return [cubic for curve in curves for cubic in _cubics_of(curve)]
+    start, end = complex(segment.start), complex(segment.end)
+    if isinstance(segment, svgelements.CubicBezier):
+        return [(start, complex(segment.control1), complex(segment.control2), end)]
+    if isinstance(segment, svgelements.QuadraticBezier):
+        control = 2 * complex(segment.control)
+        return [(start, (start + control) / 3, (end + control) / 3, end)]
+    return [(start, start, end, end)]
 
 
 def _polygon_lines(text: str, *, closed: bool) -> tuple[Floats, str | None]:
@@ -107,10 +164,10 @@ def _polygon_lines(text: str, *, closed: bool) -> tuple[Floats, str | None]:
     return lines_as_cubics(points[:-1], points[1:]), fault
 
 
-def _trace_basic(
-    tag: str, attributes: Mapping[str, str], page: tuple[float, float], drawn: _PathBuilder
-) -> str | None:
-    """Draw a basic shape, unless it is faulty; return what is."""
+def _parse_basic(
+    tag: str, attributes: Mapping[str, str], page: tuple[float, float]
+) -> tuple[_Cubics, str | None]:
+    """The cubics of a basic shape, none if it is faulty, and what is."""
     import svgelements
 
     kind, keys = _BASIC[tag]
@@ -118,16 +175,14 @@ def _trace_basic(
     lengths = {key: _parse_length(text) for key, text in texts.items()}
     for key, length in lengths.items():
         if length is None:
-            return f"its {key} {shortened(texts[key], _QUOTED)!r} cannot be read"
+            return [], f"its {key} {shortened(texts[key], _QUOTED)!r} cannot be read"
         if key in _SIZES and str(length).startswith("-"):
-            return f"its {key} is {shortened(texts[key], _QUOTED)}"
+            return [], f"its {key} is {shortened(texts[key], _QUOTED)}"
     if tag == "ellipse" and len(lengths.keys() & _SIZES) == 1:
         lengths["rx"] = lengths["ry"] = lengths.get("rx", lengths.get("ry"))
     shape = getattr(svgelements, kind)({**dict.fromkeys(_ABSENT.get(tag, ()), 0), **lengths})
     shape.render(ppi=PPI, width=page[0], height=page[1])
-    for segment in shape.segments():
-        drawn.add(segment)
-    return None
+    return [cubic for segment in shape.segments() for cubic in _cubics_of(segment)], None
 
 
 def _parse_length(length: str) -> str | float | None:
@@ -140,114 +195,3 @@ def _parse_length(length: str) -> str | float | None:
 def too_many_curves() -> InputError:
     """The error for a drawing with more than MAX_CURVES segments."""
     return InputError(f"draws more than {MAX_CURVES} segments of curves, with <use>; simplify the drawing")
-
-
-@dataclass(eq=False)
-class _PathBuilder:
-    """The target of svgelements' lexer: cubics, in the order of the path, as points of the complex plane.
-
-    A straight line has its control points at its ends. smooth: the kind of the last curve (2: quadratic,
-    3: cubic) and its last control point.
-    """
-
-    cubics: list[tuple[complex, complex, complex, complex]] = field(default_factory=list)
-    here: complex = 0j
-    begin: complex = 0j
-    smooth: tuple[int, complex] = (0, 0j)
-
-    @property
-    def current_point(self) -> SimpleNamespace:
-        return SimpleNamespace(x=self.here.real, y=self.here.imag)
-
-    def points(self) -> Floats:
-        """Control points (k, 4, 2)."""
-        values = np.array(self.cubics, dtype=complex).reshape(-1, 4)
-        cubics: Floats = np.stack([values.real, values.imag], axis=-1)
-        straight = (values[:, 0] == values[:, 1]) & (values[:, 2] == values[:, 3])
-        cubics[straight] = lines_as_cubics(cubics[straight, 0], cubics[straight, 3])
-        return cubics
-
-    def start(self) -> None:
-        pass
-
-    def end(self) -> None:
-        pass
-
-    def move(self, point: _Coordinates, **_: bool) -> None:
-        self.here = self.begin = self._at(point)
-        self.smooth = (0, 0j)
-
-    def line(self, point: _Coordinates, **_: bool) -> None:
-        end = self._at(point)
-        self._curve(self.here, end, end)
-        self.smooth = (0, 0j)
-
-    def horizontal(self, x: float, *, relative: bool) -> None:
-        self.line((x + self.here.real * relative, self.here.imag))
-
-    def vertical(self, y: float, *, relative: bool) -> None:
-        self.line((self.here.real, y + self.here.imag * relative))
-
-    def closed(self, **_: bool) -> None:
-        self.line("z")
-
-    def cubic(self, first: _Coordinates, second: _Coordinates, point: _Coordinates, **_: bool) -> None:
-        control, end = self._at(second), self._at(point)
-        self._curve(self._at(first), control, end)
-        self.smooth = (3, control)
-
-    def smooth_cubic(self, second: _Coordinates, point: _Coordinates, **_: bool) -> None:
-        first = self._reflected_control(3)
-        self.cubic((first.real, first.imag), second, point)
-
-    def quad(self, middle: _Coordinates, point: _Coordinates, **_: bool) -> None:
-        control, end = self._at(middle), self._at(point)
-        self._curve((self.here + 2 * control) / 3, (end + 2 * control) / 3, end)
-        self.smooth = (2, control)
-
-    def smooth_quad(self, point: _Coordinates, **_: bool) -> None:
-        control = self._reflected_control(2)
-        self.quad((control.real, control.imag), point)
-
-    def arc(self, rx: float, ry: float, *others: Any, **_: bool) -> None:
-        from svgelements import Arc
-
-        rotation, large, sweep, point = others
-        if large is None or sweep is None:
-            raise ValueError("a flag of an arc is neither 0 nor 1")
-        end = self._at(point)
-        if rx == 0 or ry == 0:  # as in SVG
-            self.line((end.real, end.imag))
-        elif end != self.here:
-            self.add(Arc(self.here, abs(rx), abs(ry), rotation, large, sweep, end))
-        self.here, self.smooth = end, (0, 0j)
-
-    def add(self, segment: Any) -> None:
-        """Add a segment of svgelements that has its own start."""
-        import svgelements
-
-        if isinstance(segment, svgelements.Arc):
-            for curve in segment.as_cubic_curves():
-                self.add(curve)
-        elif isinstance(segment, svgelements.CubicBezier):
-            start, first, second, end = map(
-                complex, (segment.start, segment.control1, segment.control2, segment.end)
-            )
-            self.here = start
-            self._curve(first, second, end)
-        elif isinstance(segment, svgelements.Linear):
-            self.here, end = complex(segment.start), complex(segment.end)
-            self._curve(self.here, end, end)
-
-    def _curve(self, first: complex, second: complex, end: complex) -> None:
-        if len(self.cubics) >= MAX_CURVES:
-            raise too_many_curves()
-        self.cubics.append((self.here, first, second, end))
-        self.here = end
-
-    def _reflected_control(self, kind: int) -> complex:
-        """A smooth curve's first control point: the last one reflected after a curve of its kind."""
-        return 2 * self.here - self.smooth[1] if self.smooth[0] == kind else self.here
-
-    def _at(self, point: _Coordinates) -> complex:
-        return self.begin if isinstance(point, str) else complex(*point)

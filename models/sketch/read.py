@@ -25,7 +25,6 @@ from .curves import Curves
 from .doubts import (
     describe_crowding,
     describe_loose_strokes,
-    describe_off_page,
     describe_open_drawing,
 )
 from .drawing_file import Drawing, parse_drawing, read_file
@@ -192,7 +191,6 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
         describe_open_drawing(region),
         describe_loose_strokes(walls, region, frame),
         describe_crowding(covers.filled, mask, frame),
-        describe_off_page(mask, frame, drawing.page),
     )
     return mask, Reading(drawing.page, warnings)
 

@@ -216,7 +216,7 @@ def analytic(
     Parameters
     ----------
     name
-        A name in `samples()` whose kind is `analytic`.
+        Name of a sample of the kind `analytic`; `crossfield list` lists them.
     size
         Pixels on the longer side of the grid, 1 to 4096.
     gauge

@@ -2,10 +2,10 @@
 
 A drawing passes five steps. defusedxml parses it and refuses entities. `cascade.py` finds the style of every
 element. The walk below replaces each `use` by what it shows and places the outline of every painted shape,
-which `path_data.py` reads. `pen_outlines.py` finds pen strokes among shapes that are only filled.
-`visible.py` lets resvg draw the result, and keeps of each stroke what the picture shows, in the colour that
-it shows. Pictures and `use` of other files are never loaded, text, dashes, markers and filters are ignored,
-and the work is bounded by the limits of `input_limits`.
+which `path_data.py` reads. `visible.py` lets resvg draw the result, and keeps of each stroke what the picture
+shows, in the colour that it shows. Where pen strokes are filled outlines, their picture is thinned.
+Pictures and `use` of other files are never loaded, text, dashes, markers and filters are ignored, and the
+work is bounded by the limits of `input_limits`.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from ..input_limits import (
     MAX_TRANSFORM,
     MAX_USES,
 )
-from ..instance.angles import transform_vectors
+from ..instance.angles import transform_vectors, vector_length
 from ..instance.domain import Floats
-from .cascade import UNSHOWN, Cascade, background_of, cascade_of
+from .cascade import UNSHOWN, background_of, cascade_of
 from .colour import PAPER, is_red
-from .curves import Curves, run_numbers
+from .cover import Box
+from .curves import Curves, lines_as_cubics, run_numbers
 from .labels import LabelMatcher, colour_label, labels_of
 from .path_data import SHAPES, shape_curves, too_many_curves
-from .pen_outlines import find_pen_strokes, find_silhouettes
 from .svg_effort import choose_side
 from .svg_elements import (
     GROUP,
@@ -60,7 +60,8 @@ from .svg_page import (
     view_box,
     window_around,
 )
-from .visible import PaintedShape, Seen, opaque_colour, see_strokes
+from .thinning import smooth_way, trace_shape
+from .visible import PaintedShape, Seen, opaque_colour, picture_of, see_strokes
 
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
 _INHERITED: Final = (
@@ -79,6 +80,10 @@ _SERVERS: Final = ("linearGradient", "radialGradient", "pattern")
 _REFERENCE: Final = re.compile(r"url\(\s*['\"]?#([^'\")]*)['\"]?\s*\)\s*(.*)")
 _SIDES: Final = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "bottom": "100%"}
 _WIDEST: Final = 0.05  # greatest width of a filled stroke as a share of the drawing: others are areas
+_LONG: Final = 10.0  # least half perimeter of a filled stroke in its widths
+_PAINTED: Final = 0.1  # least length of traced strokes, as a share of the length of others
+_MOST_STOPS: Final = 100  # stops of a gradient that count
+_MOST_BODIES: Final = 1000  # larger areas with which an area is compared
 
 
 @dataclass(frozen=True)
@@ -117,19 +122,24 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     page = page_of(root)
     cascade = cascade_of("".join(element.itertext()) for element in root.iter() if tag_of(element) == "style")
     styles = cascade.declare(root)
-    pictures = _list_pictures(styles)
+    pictured = dict(styles)
     _paint_background(root, styles, page)
-    walk = _ElementWalk(_put_styles(root, styles), cascade.unused, matcher)
+    walk = _ElementWalk(_put_styles(root, styles), matcher)
     painted = list(walk.shapes(root, page))
-    unread = (*pictures, *_list_faults(walk.faults), *_list_unread(cascade))
-    shapes = _trace_fills(painted, page, matcher)
-    if not sum(len(shape.points) for shape in shapes):
+    unread = _list_unread(pictured, cascade.unread, walk)
+    shapes = _leave_out_areas(painted, page, matcher)
+    pens = _find_filled_strokes([shape for shape in painted if len(shape.points)])
+    if not pens and not sum(len(shape.points) for shape in shapes):
         reason = "; ".join(unread) or "it has no visible path, line or shape; export it again"
         raise NoStrokeError(f"draws no stroke: {reason}")
     window = page.window if page else window_around(painted)
-    side = choose_side(root, window, painted)
-    seen, notes = see_strokes(frame_drawing(root, page, window), window, shapes, side)
-    curves = _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
+    framed = frame_drawing(root, page, window, choose_side(root, window, painted))
+    if pens:
+        _paint_strokes(painted, _plain_colours(root, walk.styles, painted), pens, page, matcher)
+        curves = _trace_strokes(framed, page, window, unread, has_choice=matcher is not None)
+    else:
+        seen, notes = see_strokes(framed, window, shapes)
+        curves = _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
     for values in (curves.points, curves.curve, curves.red, curves.chosen):
         if values is not None:
             values.setflags(write=False)
@@ -148,40 +158,149 @@ def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page
         root.insert(0, sheet)
 
 
-def _trace_fills(
+def _find_filled_strokes(shapes: Sequence[PaintedShape]) -> set[Element]:
+    """The elements that are only filled, and as long and thin as strokes; none if they are few."""
+    ends = [bound(shape.points.reshape(-1, 2), axis=0) for shape in shapes for bound in (np.min, np.max)]
+    widest = _WIDEST * float(np.ptp(ends, axis=0).max()) if shapes else 0.0
+    pens, painted, drawn = set(), 0.0, 0.0
+    for shape in shapes:
+        length = float(vector_length(*(shape.points[:, 3] - shape.points[:, 0]).T).sum())
+        if shape.is_stroked:
+            drawn += length
+        elif 0 < 2 * _area_of(shape) <= min(widest, length / 2 / _LONG) * length:
+            pens.add(shape.element)
+            painted += length / 2
+    return pens if painted > _PAINTED * drawn else set()
+
+
+def _area_of(shape: PaintedShape) -> float:
+    """The area of a filled shape. By the even-odd rule, its largest loop surrounds the others."""
+    loop = run_numbers(shape.points, np.zeros(len(shape.points), dtype=np.int32))
+    (x, y), (u, v) = shape.points[:, 0].T, shape.points[:, 3].T
+    areas = np.bincount(loop, (x * v - u * y) / 2)
+    return float(2 * np.abs(areas).max() - np.abs(areas).sum() if shape.is_even_odd else abs(areas.sum()))
+
+
+def _paint_strokes(
+    shapes: Sequence[PaintedShape],
+    colours: Sequence[Floats],
+    pens: set[Element],
+    page: DrawingPage | None,
+    matcher: LabelMatcher | None,
+) -> None:
+    """Paint strokes black, or red where they are curvature lines; white where as pale as the ground."""
+    ground, any_line = np.ones(3), False
+    for shape, colour in zip(shapes, colours, strict=True):
+        is_line = bool(is_red(colour))
+        if matcher is not None:
+            labels = [f"colour={shape.paint[:7]}"] if shape.paint.startswith("#") else []
+            is_line = matcher.matches(labels) or shape.chosen
+        is_pen = shape.element in pens
+        if not (is_pen or shape.is_stroked) and _covers_page(shape, page):
+            ground = colour
+        is_pale = np.abs(colour - ground).max() <= PAPER
+        any_line |= is_line and (is_pen or shape.is_stroked)
+        ink = "#fff" if is_pale else "#f00" if is_line else "#000"
+        style = [
+            shape.element.get("style", ""),
+            f"stroke:{ink}" if shape.is_stroked else "",
+            f"fill:{ink if is_pen else '#fff'}" if shape.is_filled else "",
+        ]
+        shape.element.set("style", ";".join(filter(None, style)))
+    if matcher is not None:
+        matcher.check(any_stroke=any_line)
+
+
+def _plain_colours(
+    root: Element, styles: Mapping[Element, Mapping[str, str]], shapes: Sequence[PaintedShape]
+) -> list[Floats]:
+    """Red, green and blue in [0, 1] of the paint of each shape; of a gradient, the mean of its stops."""
+    named = {f"url(#{element.get('id')})": element for element in reversed(list(root.iter()))}
+    paints = {shape.paint: named.get(shape.paint) for shape in shapes}
+    colours = {
+        paint: np.array(opaque_colour(paint[:7])) if server is None else _mean_of_stops(server, named, styles)
+        for paint, server in paints.items()
+    }
+    return [colours[shape.paint] for shape in shapes]
+
+
+def _mean_of_stops(
+    server: Element, named: Mapping[str, Element], styles: Mapping[Element, Mapping[str, str]]
+) -> Floats:
+    """The mean colour of a gradient, whose stops another one may have; not numbers without stops."""
+    for _ in range(MAX_DEPTH):
+        stops = [child for child in server[:_MOST_STOPS] if tag_of(child) == "stop"]
+        links = [named[link] for key in HREFS if (link := f"url({server.get(key, '')})") in named]
+        if stops:
+            colours = [opaque_colour(styles[stop].get("stop-color", "#000000")[:7]) for stop in stops]
+            return np.asarray(np.mean(colours, axis=0))
+        if not links:
+            break
+        server = links[0]
+    return np.full(3, np.nan)
+
+
+def _trace_strokes(
+    root: Element, page: DrawingPage | None, window: Box, notes: tuple[str, ...], *, has_choice: bool
+) -> Curves:
+    """The middle lines of the strokes in the picture of a drawing with painted strokes."""
+    picture = picture_of(root)
+    # Black, red and white, paler where a stroke or its layer is translucent.
+    is_ink, is_red = picture[..., 1] < 255 * (1 - PAPER), picture[..., 0] > picture[..., 1]
+    ways = [(way, red) for red in (False, True) for way in trace_shape(is_ink & (is_red == red), trim=True)]
+    if not ways:
+        raise InputError("shows no stroke: its filled strokes are hidden")
+    pixel = np.array(window[2:]) / picture.shape[1::-1]
+    lines = [window[:2] + pixel * (smooth_way(way) + 0.5) for way, _ in ways]
+    count = [len(line) - 1 for line in lines]
+    points = np.concatenate([lines_as_cubics(line[:-1], line[1:]) for line in lines])
+    red = np.repeat([red for _, red in ways], count)
+    curve = np.repeat(np.arange(len(ways), dtype=np.int32), count)
+    return Curves(points, curve, red, page.box if page else None, red if has_choice else None, notes)
+
+
+def _leave_out_areas(
     shapes: list[PaintedShape], page: DrawingPage | None, matcher: LabelMatcher | None
 ) -> list[PaintedShape]:
-    """The shapes with the centre lines of those that are only filled, and without lines for areas.
+    """The shapes without lines for those that are only filled.
 
     Areas show where the body ends if no stroke does: where all strokes are curvature lines, the outlines of
     the outer areas count as strokes.
     """
-    filled = [number for number, shape in enumerate(shapes) if not shape.is_stroked and len(shape.points)]
-    if not filled:
-        return shapes
-    traced, areas = list(shapes), []
-    corners = np.concatenate([shape.points.reshape(-1, 2) for shape in shapes])
-    widest = _WIDEST * float(np.ptp(corners, axis=0).max())
-    outlines = [shapes[number].points for number in filled]
-    even_odd = [shapes[number].is_even_odd for number in filled]
-    for number, stroke in zip(filled, find_pen_strokes(outlines, widest, even_odd=even_odd), strict=True):
-        points, width = (stroke.points, stroke.width) if stroke else (outlines[0][:0], 0.0)
-        traced[number] = replace(shapes[number], points=points, width=width)
-        if stroke is None and not _is_ground(shapes[number], page):
-            areas.append(number)
-    if areas and all(_is_curvature_line(shape, matcher) for shape in traced if len(shape.points)):
-        for place in find_silhouettes([shapes[number].points for number in areas]):
-            traced[areas[place]] = shapes[areas[place]]
-    return traced
+    kept = [shape if shape.is_stroked else replace(shape, points=shape.points[:0]) for shape in shapes]
+    areas = [
+        number
+        for number, shape in enumerate(shapes)
+        if len(shape.points) and not (shape.is_stroked or _is_ground(shape, page))
+    ]
+    if areas and all(_is_curvature_line(shape, matcher) for shape in kept if len(shape.points)):
+        for number in _find_silhouettes(shapes, areas):
+            kept[number] = shapes[number]
+    return kept
+
+
+def _find_silhouettes(shapes: Sequence[PaintedShape], areas: Sequence[int]) -> list[int]:
+    """The numbers of the areas that are not in the box of a larger one: the outline of the drawing."""
+    corners = [shapes[number].points.reshape(-1, 2) for number in areas]
+    low, high = (np.array([bound(corner, axis=0) for corner in corners]) for bound in (np.min, np.max))
+    outer: list[int] = []
+    for place in np.argsort(-np.prod(high - low, axis=1), kind="stable").tolist():
+        around = outer[:_MOST_BODIES]
+        is_within = (low[around] <= low[place]) & (high[around] >= high[place])
+        if not is_within.all(axis=1).any():
+            outer.append(place)
+    return [areas[place] for place in outer]
 
 
 def _is_ground(shape: PaintedShape, page: DrawingPage | None) -> bool:
     """Whether a filled shape is the ground of a drawing: as white as paper, or as large as the page."""
     rgb = opaque_colour(shape.paint[:7])
     opacity = int(shape.paint[7:], 16) / 255 if shape.paint[7:] and not np.isnan(rgb).any() else 1.0
-    if opacity * (1 - min(rgb)) < PAPER:
-        return True
-    if page is None:
+    return opacity * (1 - min(rgb)) < PAPER or _covers_page(shape, page)
+
+
+def _covers_page(shape: PaintedShape, page: DrawingPage | None) -> bool:
+    if page is None or not len(shape.points):
         return False
     corners, start = shape.points.reshape(-1, 2), np.array(page.window[:2])
     end, room = start + page.window[2:], 1e-3 * max(page.window[2:])
@@ -219,37 +338,30 @@ def _join_strokes(
     return Curves(points, run_numbers(points, number), red[number], page.box if page else None, chosen, notes)
 
 
-def _list_faults(faults: Sequence[str]) -> tuple[str, ...]:
-    """A note on the shapes that cannot be read to their end."""
-    if not faults:
-        return ()
-    shapes = "1 shape is" if len(faults) == 1 else f"{len(faults)} shapes are"
-    return (f"{shapes} faulty and left out from the fault on, first {faults[0]}; export the drawing again",)
-
-
-def _list_pictures(styles: Mapping[Element, Mapping[str, str]]) -> tuple[str, ...]:
-    """A note on the pictures in a drawing."""
-    names = [
+def _list_unread(
+    styles: Mapping[Element, Mapping[str, str]], unread: Mapping[Element, str], walk: _ElementWalk
+) -> tuple[str, ...]:
+    """Notes on the pictures, faults, colours and transforms of a drawing that were not read."""
+    pictures = [
         name_of(element)
         for element, style in styles.items()
         if tag_of(element) == "image" and style.get("display") != "none"
     ]
-    if not names:
-        return ()
-    count = "1 picture is" if len(names) == 1 else f"{len(names)} pictures are"
-    return (f"{count} left out, first {names[0]}; give a picture as a file of its own to trace it",)
-
-
-def _list_unread(cascade: Cascade) -> Iterator[str]:
-    """Notes on the colours and other declarations that were not understood."""
-    for texts, noun, many, remedy in (
-        (cascade.unread, "colour", "colours", "write #rrggbb"),
-        (cascade.unused, "property", "properties", "apply it in the drawing program"),
-    ):
-        if texts:
-            element, text = next(iter(texts.items()))
-            count = f"1 {noun} is" if len(texts) == 1 else f"{len(texts)} {many} are"
-            yield f"{count} not understood, first {shortened(text, 40)!r} of {name_of(element)}; {remedy}"
+    colours, transforms = (
+        [f"{shortened(text, 40)!r} of {name_of(element)}" for element, text in texts.items()]
+        for texts in (unread, walk.unused)
+    )
+    notes = (
+        (pictures, "picture", "left out", "give a picture as a file of its own to trace it"),
+        (walk.faults, "shape", "faulty and left out from the fault on", "export the drawing again"),
+        (colours, "colour", "not understood", "write #rrggbb"),
+        (transforms, "transform", "not understood", "apply it in the drawing program"),
+    )
+    return tuple(
+        f"{len(found)} {noun}{' is' if len(found) == 1 else 's are'} {what}, first {found[0]}; {remedy}"
+        for found, noun, what, remedy in notes
+        if found
+    )
 
 
 def _parse_xml(data: bytes) -> Element:
@@ -295,13 +407,13 @@ def _put_styles(root: Element, styles: dict[Element, dict[str, str]]) -> dict[El
 class _ElementWalk:
     """A walk through a drawing.
 
-    styles: of every element, without what it inherits. unused: an element and its declaration, for each that
-    is not understood. faults: of shapes, with their names.
+    styles: of every element, without what it inherits. faults: of shapes, with their names. unused: an
+    element and its transform, for each that is not understood.
     """
 
     styles: dict[Element, dict[str, str]]
-    unused: dict[Element, str]
     matcher: LabelMatcher | None
+    unused: dict[Element, str] = field(default_factory=dict)
     outlines: dict[Any, Floats] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
 
@@ -453,7 +565,7 @@ def _transform(
     try:
         matrix = Matrix(text)
     except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError):
-        unused[element] = f"transform: {text}"
+        unused[element] = text
         element.attrib.pop("transform", None)
         return None
     if origin := style.get("transform-origin", ""):

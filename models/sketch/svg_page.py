@@ -62,10 +62,12 @@ def window_around(shapes: Sequence[PaintedShape]) -> Box:
     return left, top, wide, tall
 
 
-def frame_drawing(root: Element, page: DrawingPage | None, window: Box) -> Element:
-    """The drawing inside a root whose viewBox is the window."""
+def frame_drawing(root: Element, page: DrawingPage | None, window: Box, side: int) -> Element:
+    """The drawing in a root that shows the window, with `side` pixels along its longer side."""
     view, box = (page.view, page.box) if page else (UNPAGED, UNPAGED)
-    frame = Element(SVG + "svg", {"viewBox": _join(window), "preserveAspectRatio": "none"})
+    wide, high = (str(max(1, round(side * length / max(window[2:])))) for length in window[2:])
+    shown = {"viewBox": _join(window), "preserveAspectRatio": "none", "width": wide, "height": high}
+    frame = Element(SVG + "svg", shown)
     sides = {key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), box, strict=True)}
     inner = SubElement(
         frame,

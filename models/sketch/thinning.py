@@ -1,10 +1,41 @@
-"""Thinning of a shape to lines one pixel wide."""
+"""Middle lines of the strokes in a picture, by thinning."""
 
 from __future__ import annotations
 
-import numpy as np
+from collections import Counter
+from typing import Final
 
-from ..instance.domain import Bools
+import numpy as np
+from numpy.typing import NDArray
+
+from ..instance.domain import Bools, Floats
+
+_SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
+_SHORTEST: Final = 6  # pixels of a traced line; shorter ones, or than a stroke is wide, are burrs
+_SHORTEST_LINK: Final = 4  # pixels of a traced line between two junctions
+_AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
+
+_Pixel = tuple[int, int]
+_Way = list[_Pixel]
+
+
+def trace_shape(shape: Bools, *, trim: bool = False) -> list[NDArray[np.int64]]:
+    """The middle lines of a shape [h, w] as rows and columns (k, 2), from one end or junction to the next.
+
+    trim: whether to cut half a pen off their free ends, where thinned strokes turn to a corner.
+    """
+    line = thin_shape(shape)
+    width = float(shape.sum()) / max(float(line.sum()), 1.0)
+    ways = [np.array(way) for way in _trace_ways(line)]
+    ends = Counter(tuple(end) for way in ways for end in way[[0, -1]].tolist())
+    ways = [way for way in ways if len(way) >= max(_SHORTEST, width) or _is_link(way, ends)] or ways
+    cut = int(width / 2) if trim else 0
+    return [
+        way[cut * (ends[tuple(way[0])] == 1) : len(way) - cut * (ends[tuple(way[-1])] == 1)]
+        if len(way) > 4 * cut
+        else way
+        for way in ways
+    ]
 
 
 def thin_shape(shape: Bools) -> Bools:
@@ -29,3 +60,59 @@ def _removable_pixels(line: Bools, *, first: bool) -> Bools:
     turns = (~around & np.roll(around, -1, axis=0)).sum(axis=0, dtype=np.uint8)
     sides = (up & right & down) | (right & down & left) if first else (up & right & left) | (up & down & left)
     return np.asarray((count >= 2) & (count <= 6) & (turns == 1) & ~sides)
+
+
+def _is_link(way: NDArray[np.int64], ends: Counter[_Pixel]) -> bool:
+    """Whether a short way lies between two junctions, where it closes a gap."""
+    return len(way) >= _SHORTEST_LINK and all(ends[row, column] > 1 for row, column in way[[0, -1]].tolist())
+
+
+def smooth_way(way: NDArray[np.int64]) -> Floats:
+    """A traced line (k, 2) as a smooth one with the same ends and half of its points: columns and rows."""
+    from scipy import ndimage
+
+    way = way[:, ::-1]
+    even = ndimage.gaussian_filter1d(way.astype(np.float64), _SMOOTH, axis=0, mode="nearest")
+    if (way[0] == way[-1]).all():
+        even = ndimage.gaussian_filter1d(way[:-1].astype(np.float64), _SMOOTH, axis=0, mode="wrap")
+        return np.concatenate([even[::2], even[:1]])
+    even[0], even[-1] = way[0], way[-1]
+    return np.concatenate([even[:-1:2], even[-1:]])
+
+
+def _trace_ways(line: Bools) -> list[_Way]:
+    """The pixels of a thinned drawing as ways from one end or junction to the next, each link once."""
+    there: set[_Pixel] = {(row, column) for row, column in np.argwhere(line).tolist()}
+    links = {pixel: _neighbours(pixel, there) for pixel in there}
+    used: set[tuple[_Pixel, _Pixel]] = set()
+
+    def walk(first: _Pixel, second: _Pixel) -> _Way:
+        way = [first, second]
+        used.update({(first, second), (second, first)})
+        while len(links[way[-1]]) == 2:
+            after = next((pixel for pixel in links[way[-1]] if (way[-1], pixel) not in used), None)
+            if after is None:
+                break
+            used.update({(way[-1], after), (after, way[-1])})
+            way.append(after)
+        return way
+
+    # Ends and junctions first; what is left are closed ways.
+    order = sorted(there, key=lambda pixel: (len(links[pixel]) == 2, pixel))
+    return [
+        walk(pixel, neighbour)
+        for pixel in order
+        for neighbour in links[pixel]
+        if (pixel, neighbour) not in used
+    ]
+
+
+def _neighbours(pixel: _Pixel, there: set[_Pixel]) -> list[_Pixel]:
+    """The neighbours of a pixel; one at a corner counts only if no neighbour at a side is next to it."""
+    row, column = pixel
+    return [
+        (row + down, column + right)
+        for down, right in _AROUND
+        if (row + down, column + right) in there
+        and not (down and right and ((row, column + right) in there or (row + down, column) in there))
+    ]

@@ -32,8 +32,6 @@ _CROSSING: Final = 12.0  # widths of the shape in front: a line that is covered 
 _MEETING: Final = 3.0  # the same for the covered end of a line
 _GLITCH: Final = 3.0  # pixels: a shorter gap is one of rasterization
 _WORTH_A_NOTE: Final = 0.05  # of the length of a shape
-_REASONS: Final = ("clipped or masked", "covered", "off the page", "drawn elsewhere by the renderer")
-_PALE: Final = len(_REASONS)  # a stroke in the colour of its ground is none, and needs no note
 _HIDDEN, _VISIBLE, _CROSSED = 0, 1, 2
 
 
@@ -92,26 +90,24 @@ class _LineSamples:
 
 
 def see_strokes(
-    root: Element, window: Box, shapes: Sequence[PaintedShape], side: int = SIDE
+    root: Element, window: Box, shapes: Sequence[PaintedShape]
 ) -> tuple[list[Seen], tuple[str, ...]]:
     """The visible part of each shape, and notes on the strokes that are left out. Raises InputError.
 
-    root: the drawing, whose viewBox is the window; its shapes get other styles. window: x, y, width, height.
-    side: pixels on the longer side of the pictures.
+    root: the drawing, framed by the window: x, y, width and height. Its shapes get other styles.
     """
-    pixel = max(window[2:]) / side
-    wide, high = (max(1, round(length / pixel)) for length in window[2:])
-    root.attrib.update(width=str(wide), height=str(high))
+    pixel = max(window[2:]) / max(int(root.attrib[side]) for side in ("width", "height"))
     samples = _sample_lines(shapes, window, pixel)
     styles = [shape.element.get("style", "") for shape in shapes]
     for shape, style in zip(shapes, styles, strict=True):
         shape.element.set("style", style + _widened(shape, pixel))
-    shown = _render(root)
+    shown = picture_of(root)
     ground = None
     if any(shape.is_ground for shape in shapes):
         for shape, style in zip(shapes, styles, strict=True):
-            shape.element.set("style", style + ";stroke:none" + ("" if shape.is_ground else ";fill:none"))
-        ground = _render(root)
+            bare = style + ";stroke:none" + ("" if shape.is_ground else ";fill:none")
+            shape.element.set("style", bare.lstrip(";"))  # resvg drops a style that begins with a semicolon
+        ground = picture_of(root)
     inside = samples.pixel >= 0
     colour = np.where(inside[:, None], _at(shown, samples.pixel), np.nan)
     contrast = inside & (np.abs(colour - _at(ground, samples.pixel)).max(axis=1) > PAPER)
@@ -120,9 +116,10 @@ def see_strokes(
     notes: tuple[str, ...] = ()
     visible, front = own, 2 * samples.shape
     if not own.all():
-        front, elsewhere = _find_fronts(root, shapes, styles, samples, pixel)
-        visible, reason = _decide(samples, shapes, front, elsewhere, contrast=contrast, own=own, pixel=pixel)
-        notes = _describe_hidden(samples, shapes, visible, reason)
+        front = _find_fronts(root, shapes, styles, samples, pixel)
+        visible = _decide(samples, shapes, front, contrast=contrast, own=own, pixel=pixel)
+        # A stroke in the colour of its ground is none, and needs no note.
+        notes = _describe_hidden(samples, shapes, ~visible & (front != 2 * samples.shape))
     colour[~_shows_colour(samples, visible & contrast, front, own)] = np.nan
     return _collect(samples, shapes, visible, colour, expected), notes
 
@@ -152,8 +149,8 @@ def opaque_colour(paint: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def _render(root: Element) -> NDArray[np.uint8]:
-    """The picture of a drawing on white, uint8 [h, w, 3], without antialiasing. Raises InputError."""
+def picture_of(root: Element) -> NDArray[np.uint8]:
+    """The picture of a framed drawing on white, uint8 [h, w, 3], without antialiasing. Raises InputError."""
     import resvg_py
     from PIL import Image
 
@@ -213,31 +210,24 @@ def _sample_lines(shapes: Sequence[PaintedShape], window: Box, pixel: float) -> 
 
 def _find_fronts(
     root: Element, shapes: Sequence[PaintedShape], styles: Sequence[str], samples: _LineSamples, pixel: float
-) -> tuple[Indices, Bools]:
-    """The number of the paint in front (s,) at each sample, and which shapes are painted elsewhere only.
+) -> Indices:
+    """The number of the paint in front (s,) at each sample.
 
     Number 2 n is the line of shape n, and 2 n + 1 the area that it fills. -1 is paper, -2 a mixture.
     """
     for number, (shape, style) in enumerate(zip(shapes, styles, strict=True)):
         line, area = (f"#{_flat_colour(2 * number + part):06x}" for part in (0, int(shape.is_ground)))
         flat = ";opacity:1;stroke-opacity:1;fill-opacity:1"
-        flat += (f";stroke:{line}" if len(shape.points) else "") + (
-            f";fill:{area}" if shape.is_filled else ""
-        )
+        flat += f";stroke:{line}" if len(shape.points) else ""
+        flat += f";fill:{area}" if shape.is_filled else ""
         shape.element.set("style", style + _widened(shape, pixel) + flat)
     _make_opaque(root)
-    picture = _render(root).reshape(-1, 3)
+    picture = picture_of(root).reshape(-1, 3)
     known = {_flat_colour(number): number for number in range(2 * len(shapes))} | {0xFFFFFF: -1}
     codes, inverse = np.unique(_codes(picture[samples.pixel]), return_inverse=True)
     front = np.array([known.get(code, -2) for code in codes.tolist()])[inverse]
     front[samples.pixel < 0] = -1
-    is_met = np.zeros(len(shapes), dtype=bool)
-    is_met[samples.shape[front == 2 * samples.shape]] = True
-    unmet = np.flatnonzero(~is_met)
-    elsewhere = np.zeros(len(shapes), dtype=bool)
-    if len(unmet):
-        elsewhere[unmet] = np.isin([_flat_colour(2 * number) for number in unmet.tolist()], _codes(picture))
-    return front, elsewhere
+    return front
 
 
 def _codes(colours: NDArray[np.uint8]) -> Indices:
@@ -267,19 +257,14 @@ def _decide(
     samples: _LineSamples,
     shapes: Sequence[PaintedShape],
     front: Indices,
-    elsewhere: Bools,
     *,
     contrast: Bools,
     own: Bools,
     pixel: float,
-) -> tuple[Bools, Indices]:
-    """Which samples (s,) are visible, and the number (s,) in _REASONS, or _PALE, why others are not."""
-    line = 2 * samples.shape
-    is_crossed = contrast & ~own & (front >= 0) & (front % 2 == 0) & (front != line)
+) -> Bools:
+    """Which samples (s,) are visible."""
+    is_crossed = contrast & ~own & (front >= 0) & (front % 2 == 0) & (front != 2 * samples.shape)
     state = np.where(is_crossed, _CROSSED, np.where(contrast, _VISIBLE, _HIDDEN))
-    reason = np.where(front == line, _PALE, np.where(front >= 0, 1, 0))
-    reason[(reason == 0) & elsewhere[samples.shape]] = 3
-    reason[samples.pixel < 0] = 2
     width = np.maximum(np.array([shape.width for shape in shapes]) / pixel, _LEAST_WIDTH)
     limit = np.where(is_crossed, _MEETING * width[front.clip(0) // 2], _GLITCH)
     starts = np.flatnonzero((np.diff(samples.run, prepend=-1) != 0) | (np.diff(state, prepend=-1) != 0))
@@ -291,28 +276,21 @@ def _decide(
     limit = np.maximum.reduceat(limit, starts)
     is_crossing = (part == _CROSSED) & beside[0] & beside[1] & (length <= _CROSSING / _MEETING * limit)
     visible = (part == _VISIBLE) | is_crossing | ((length <= limit) & (beside[0] | beside[1]))
-    return np.repeat(visible, np.diff([*starts, len(state)])), reason
+    return np.repeat(visible, np.diff([*starts, len(state)]))
 
 
-def _describe_hidden(
-    samples: _LineSamples, shapes: Sequence[PaintedShape], visible: Bools, reason: Indices
-) -> tuple[str, ...]:
-    """A note for each reason for which more than a small part of a shape is left out."""
+def _describe_hidden(samples: _LineSamples, shapes: Sequence[PaintedShape], lost: Bools) -> tuple[str, ...]:
+    """A note on the shapes of which more than a small part, samples (s,), is hidden."""
     whole = np.bincount(samples.shape, samples.length, len(shapes))
-    notes = []
-    for number, words in enumerate(_REASONS):
-        lost = ~visible & (reason == number)
-        share = np.bincount(samples.shape[lost], samples.length[lost], len(shapes)) / np.maximum(whole, 1e-9)
-        left_out = np.flatnonzero(share > _WORTH_A_NOTE)
-        if len(left_out):
-            first = samples.place[np.flatnonzero(lost & (samples.shape == left_out[0]))[0]]
-            count = f"{len(left_out)} strokes are" if len(left_out) > 1 else "1 stroke is"
-            partly = "" if (share[left_out] > 1 - _WORTH_A_NOTE).all() else ", wholly or in part"
-            notes.append(
-                f"{count} {words}{partly}, first {shapes[left_out[0]].name} round "
-                f"({first[0]:.4g}, {first[1]:.4g}): left out, as the picture does not show it there"
-            )
-    return tuple(notes)
+    share = np.bincount(samples.shape[lost], samples.length[lost], len(shapes)) / np.maximum(whole, 1e-9)
+    left_out = np.flatnonzero(share > _WORTH_A_NOTE)
+    if not len(left_out):
+        return ()
+    first = samples.place[np.flatnonzero(lost & (samples.shape == left_out[0]))[0]]
+    count = f"{len(left_out)} strokes are" if len(left_out) > 1 else "1 stroke is"
+    partly = "" if (share[left_out] > 1 - _WORTH_A_NOTE).all() else ", wholly or in part"
+    place = f"{shapes[left_out[0]].name} round ({first[0]:.4g}, {first[1]:.4g})"
+    return (f"{count} hidden{partly}, first {place}: left out, as the picture does not show it there",)
 
 
 def _collect(

@@ -14,7 +14,7 @@ from scipy.sparse.csgraph import connected_components
 
 from ..instance.domain import Ints
 from ..instance.grid import Grid
-from ..instance.sparse_systems import PULL, Solve, factor_matrix, nested_dissection_order
+from ..instance.sparse_systems import PULL, Solve, factor_matrix
 
 FEW: Final = 4096  # pixels up to which systems are factored
 _SIDE: Final = 3  # pixels of an aggregate: smoothed ones meet only their eight neighbours
@@ -31,8 +31,7 @@ def approximate_inverse(matrix: Any, grid: Grid, first: Ints, second: Ints) -> S
     first, second: (k,), linked unknowns of neighbouring pixels, which differ little in smooth solutions.
     """
     if grid.size <= FEW:
-        places = nested_dissection_order(grid.rows, grid.columns, reach=1)
-        return factor_matrix(matrix, np.stack([places, places + grid.size], axis=1).ravel())
+        return factor_matrix(matrix)
     matrix = (matrix + PULL * sparse.eye_array(matrix.shape[0])).tocsr()
     row, column = (np.tile(places // _SIDE, 2) for places in (grid.rows, grid.columns))
     inside = (row[first] == row[second]) & (column[first] == column[second])
@@ -47,10 +46,7 @@ def approximate_inverse(matrix: Any, grid: Grid, first: Ints, second: Ints) -> S
     relax = _DAMPING * _invert_blocks(matrix, grid.size)
     grow = (whole - relax @ (matrix @ whole)).tocsr()
     shrink = grow.conj().T.tocsr()
-    some = np.zeros(count, dtype=np.intp)  # an unknown of each aggregate
-    some[aggregate] = every
-    order = nested_dissection_order(row[some], column[some], reach=1)
-    solve_coarse = factor_matrix(shrink @ (matrix @ grow), order)
+    solve_coarse = factor_matrix(shrink @ (matrix @ grow))
 
     def solve(right: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
         x: np.ndarray[Any, Any] = relax @ right

@@ -19,14 +19,17 @@ from .stencils import SLOPES, Crosses, Stencils, scale_rows
 
 CONJUGACY: Final = 0.1  # from 0.01 to 10 the surfaces of docs/surface.md differ by tenths of a degree
 FORGIVEN: Final = 0.007  # cosine of the angle in space from which a cross counts less and less
-_ROUNDS: Final = 60  # of the descent by Levenberg and Marquardt; 5 to 25 are usual
+_ROUNDS: Final = 300  # of the descent by Levenberg and Marquardt; 5 to 25 are usual
 _TRIALS: Final = 12  # increases of the damping in a round
 _FALL: Final = 2e-4  # least share of the energy that a round has to remove before another one
+_FALL_OF_FEW: Final = 1e-8  # where a handful of pixels follows a curved valley in rounds of a millisecond
+_FEW: Final = 100  # unknowns
 _DAMPING: Final = 1e-2
 _LEAST: Final = 1e-9
-_RESIDUAL: Final = 0.05  # relative, of a system that is not factored
+_RESIDUAL: Final = 0.05  # relative, of a large system that is not factored
+_EXACT: Final = 1e-9  # of a small one, because starts are compared there
+_SMALL: Final = 1000  # unknowns of a small system
 _STEPS: Final = 12  # of conjugate gradients, which take as long as a factorisation
-_FEW: Final = 1000  # unknowns of systems that are always factored: exact, and as quick
 _MEETING: Final = 2  # rows or columns between two heights that meet in a square
 _UP: Final = 5.0
 _DOWN: Final = 8.0
@@ -227,7 +230,8 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
 def descend(equations: Equations, z: Floats, is_over: IsOver) -> tuple[float, Floats]:
     """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
     energy, damping = equations.energy(z), _DAMPING
-    solver = SimilarSystems(equations.stencils.order, steps=_STEPS, few=_FEW)
+    solver, residual = SimilarSystems(steps=_STEPS), _EXACT if len(z) <= _SMALL else _RESIDUAL
+    least_fall = _FALL_OF_FEW if len(z) <= _FEW else _FALL
     for _ in range(_ROUNDS):
         if is_over():
             break
@@ -235,7 +239,7 @@ def descend(equations: Equations, z: Floats, is_over: IsOver) -> tuple[float, Fl
         diagonal = sparse.diags_array(curvature.diagonal())
         for _ in range(_TRIALS):
             damped = curvature + damping * diagonal
-            tried = z - solver.solve(damped, slope, _RESIDUAL)
+            tried = z - solver.solve(damped, slope, residual)
             reached = equations.energy(tried)
             if reached < energy:
                 break
@@ -244,7 +248,7 @@ def descend(equations: Equations, z: Floats, is_over: IsOver) -> tuple[float, Fl
             break
         fallen, z, energy = energy - reached, tried, reached
         damping = max(damping / _DOWN, _LEAST)
-        if fallen <= _FALL * (energy + fallen):
+        if fallen <= least_fall * (energy + fallen):
             break
     return energy, z
 

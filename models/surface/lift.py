@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from operator import itemgetter
 from typing import Final
 
@@ -76,7 +76,7 @@ def surface(
         For a hint outside the mask, or with angles that no normal has.
 
     """
-    instance, all_hints, cut = field.instance, tuple(hints), TimeLimit(stop_function(stop))
+    instance, all_hints, is_over = field.instance, tuple(hints), stop_function(stop)
     check_flag("flip", flip)
     check_hints(all_hints, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
@@ -88,7 +88,7 @@ def surface(
         stencils, crosses = Stencils(Grid(mask)), all_crosses.at(instance.grid.number[window][mask])
         level = GridLevel(stencils, crosses, (window[0].start, window[1].start))
         part_hints = [hint for hint in all_hints if part_of[hint.row, hint.column] == number]
-        z = _solve_part(level, part_hints, cut, flip=flip)
+        z = _solve_part(level, part_hints, is_over, flip=flip)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
         parts_done.append((level.grid.size, part_hints))
@@ -97,21 +97,8 @@ def surface(
     freedom = () if _decide_side(part_hints) else (INSIDE_OUT,)
     lifted = Surface(field, heights, confidence_of(field, off), (), freedom)
     slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
-    late = ("time was over before it had settled",) if cut.off else ()
+    late = ("time was over before it had settled",) if is_over() else ()
     return replace(lifted, doubts=(*doubts_of(field, off, slant), *late))
-
-
-@dataclass
-class TimeLimit:
-    """A time limit that remembers whether it was ever over."""
-
-    is_over: IsOver
-    off: bool = False
-
-    def __call__(self) -> bool:
-        """Whether time is over."""
-        self.off = self.off or self.is_over()
-        return self.off
 
 
 def _solve_part(part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool) -> Floats:

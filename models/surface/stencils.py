@@ -13,7 +13,6 @@ from scipy import sparse
 from ..field.field import CrossField
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.grid import Grid
-from ..instance.sparse_systems import nested_dissection_order
 from ..smooth.polyvector import roots
 
 SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
@@ -44,12 +43,6 @@ class Stencils:
     def count(self) -> int:
         """Number of corners N."""
         return int(self.used.sum())
-
-    @cached_property
-    def order(self) -> Ints:
-        """The order of elimination of the heights (N,), of which those two rows or columns apart meet."""
-        row, column = np.nonzero(self.used)
-        return nested_dissection_order(row.astype(np.int32), column.astype(np.int32), reach=2)
 
     @cached_property
     def slopes(self) -> tuple[Any, Any]:

@@ -41,6 +41,10 @@ class Surface(Pictured):
     doubts: tuple[str, ...] = ()
     freedom: tuple[str, ...] = ()
 
+    def __repr__(self) -> str:
+        deep = np.nanmax(self.heights) - np.nanmin(self.heights)
+        return f"<Surface on {self.instance.name}: {deep:.4g} pixels deep, doubts {len(self.doubts)}>"
+
     @property
     def instance(self) -> Instance:
         """The instance of the field."""

@@ -431,8 +431,6 @@ const actions = {
   empty: () => { if (mayReplace()) replace({ ...emptyDocument(), page: canvasPage(), size: state.doc.size }); },
   fingers: () => { state.fingers = !fingersDraw(); controls(); },
   help: () => dialog("Help", $("#help").content.cloneNode(true)),
-  elsewhere: () => state.field ? dialog("The same without the page", element("p", "Download the drawing and the instance, then run in their folder:"),
-    element("pre", state.field.commands.join("\n").replace("milp-mccormick -F mps", `${$("#formulation").value} -F ${$("#format").value}`))) : status("There is no field yet. Draw a curvature line first."),
 };
 const closeMenus = () => all(".menu[open]").forEach(each => { each.open = false; });
 document.addEventListener("click", event => {

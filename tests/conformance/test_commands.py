@@ -13,19 +13,17 @@ COMMANDS = {
     "instance": "instance {instance} -o {folder}/again.npz",
     "instance mask": "instance {instance} -o {folder}/mask.png",
     "instance crosses": "instance {instance} --crosses orthogonal --gauge strokes -o {folder}/again.json",
-    "export": "export {instance} -o {folder} --start {field} --gzip -q",
-    "export formats": "export {instance} -o {folder} --format lp --format mod --format osil --relax -q",
-    "read": "read {answer} --manifest {manifest} -o {folder}/read.npz -q",
+    "export": "export {instance} -o {folder} --start {field} --gzip",
+    "export formats": "export {instance} -o {folder} --format lp --format mod --format osil --relax",
+    "read": "read {answer} --manifest {manifest} -o {folder}/read.npz",
     "draw field": "draw {field} --kind crosses -o {folder}/field.png",
     "draw instance": "draw {instance} -o {folder}/instance.svg",
-    "shade": "shade {field} -o {folder} --side 16 -q",
-    "prove": "prove {instance} -o {folder} --gap 1 -q",
-    "verify": "verify {models} --program scip -q",
-    "run": "run {instance} -o {folder} --time-limit 0.1 -q",
-    **{
-        f"solve {name}": f"solve {{instance}} -m {name} -o {{folder}} --time-limit 0.1 -q" for name in METHODS
-    },
-    "solve -f": "solve {instance} -f qp -o {folder} --time-limit 2 -q",
+    "shade": "shade {field} -o {folder} --side 16",
+    "prove": "prove {instance} -o {folder} --gap 1",
+    "verify": "verify {models} --program scip",
+    "run": "run {instance} -o {folder} --time-limit 0.1",
+    **{f"solve {name}": f"solve {{instance}} -m {name} -o {{folder}} --time-limit 0.1" for name in METHODS},
+    "solve -f": "solve {instance} -f qp -o {folder} --time-limit 2",
 }
 """Command lines; `solve` has one for each method of the table."""
 del COMMANDS["solve prove"]  # a command of its own
@@ -62,7 +60,7 @@ def prepared(tmp_path_factory):
             folder = tmp_path_factory.mktemp("kind")
             instance, field = kind(name), cf.greedy_field(kind(name))
             problem = cf.formulate(instance, "qp-fixed", p=field.p)
-            cf.write_problem(problem, folder / "models", formats=["nl", "lp"], start=field)
+            cf.write(problem, folder / "models", formats=["nl", "lp"], start=field)
             known[name] = {
                 "instance": cf.write_instance(instance, folder / "kind.json"),
                 "field": cf.write_field(field, folder / "field.npz"),

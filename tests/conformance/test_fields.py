@@ -6,9 +6,10 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
+from crossfield.models.errors import DomainError
 from hypothesis import given, settings
 from independent_energy import Formulas, angle_in
-from instance_kinds import KINDS, MANY, TINY, crossed, instances, kind, on_mesh
+from instance_kinds import KINDS, MANY, SMALL, TINY, crossed, instances, kind, on_mesh
 
 NORMS = (1, 2, "mixed")
 WORK = 4000
@@ -17,6 +18,7 @@ METHODS = {
     "greedy": lambda instance, stop: cf.greedy_field(instance, stop=stop),
     "improved": lambda instance, stop: cf.improved_field(cf.greedy_field(instance), stop=stop),
     "power": lambda instance, _: cf.power_field(instance),
+    "power, 9 steps": lambda instance, _: cf.power_field(instance, steps=9),
     "polyvector": lambda instance, _: cf.polyvector_field(instance),
     "bend": lambda instance, stop: cf.bend_field(cf.polyvector_field(instance), stop=stop),
     "search": lambda instance, stop: cf.search(instance, rounds=0, jobs=1, stop=stop).field,
@@ -42,14 +44,10 @@ def prove(instance, stop=None, norm=2):
 def refusal(method, instance):
     """The error by which a method refuses an instance, as it documents; None where it must not."""
     if method in {"polyvector", "bend"}:
-        return cf.DomainError if on_mesh(instance) else None
+        return DomainError if on_mesh(instance) else None
     if method == "prove" and not instance.orthogonal:
         return (
-            cf.InputError
-            if instance.pair_weights is not None
-            else cf.DomainError
-            if on_mesh(instance)
-            else None
+            cf.InputError if instance.pair_weights is not None else DomainError if on_mesh(instance) else None
         )
     return None
 
@@ -58,7 +56,7 @@ def field_of(method, instance):
     """The field of a method; None where it may refuse the instance, and does."""
     try:
         return METHODS[method](instance, patience())
-    except (cf.DomainError, cf.InputError) as error:
+    except (DomainError, cf.InputError) as error:
         if type(error) is not refusal(method, instance):
             raise
         return None
@@ -84,6 +82,36 @@ def test_a_field_has_the_energies_of_the_formulas(name, method):
     field = field_of(method, kind(name))
     if field is not None:
         assert_field(field)
+
+
+@pytest.mark.parametrize("name, method", crossed(SMALL, METHODS, every=9))
+def test_a_method_gives_the_same_bits_again_and_a_field_when_it_has_to_end(name, method):
+    one, two = (field_of(method, kind(name)) for _ in range(2))
+    if one is None:
+        return
+    for array in ("alpha", "beta", "p"):
+        assert getattr(one, array).tobytes() == getattr(two, array).tobytes()
+    for questions in (0, 2):
+        asked = itertools.count()
+        field = METHODS[method](kind(name), lambda asked=asked, most=questions: next(asked) >= most)
+        assert_field(field)
+        assert next(asked) <= questions + 40
+
+
+OF_INTEGERS = [name for name in SMALL if kind(name).orthogonal or on_mesh(kind(name))]
+"""Kinds that are searched in one process, which can end at any step."""
+
+
+@pytest.mark.parametrize("name", crossed(OF_INTEGERS, every=3))
+def test_a_search_that_has_to_end_returns_its_best_field(name):
+    first = cf.power_field(kind(name)).energy().total
+    for questions in (0, 10, 100, 300):
+        asked = itertools.count()
+        result = cf.search(kind(name), jobs=1, stop=lambda asked=asked, most=questions: next(asked) >= most)
+        assert result.ended in {"interrupted", "patience"}
+        stated, energy = result.energies[-1][1], result.field.energy().total
+        assert energy == pytest.approx(stated, rel=1e-6, abs=1e-9)
+        assert not questions or energy <= first * (1 + 1e-6) + 1e-9
 
 
 def assert_order(instance):
@@ -221,8 +249,11 @@ def test_symmetric_copies_have_the_same_energies(name):
     for copy, turned in copies(instance):
         same = cf.CrossField.from_lines(copy, turned(u), turned(v))
         assert_field(same)
-        energies = (vars(field.energy()), vars(same.energy()))
-        assert energies[0] == pytest.approx(energies[1], rel=1e-8, abs=1e-9)
+        fields = [(field, same), (cf.power_field(instance), cf.power_field(copy))]
+        if not on_mesh(instance) and not instance.orthogonal:
+            fields.append((cf.polyvector_field(instance), cf.polyvector_field(copy)))
+        for one, other in fields:
+            assert vars(one.energy()) == pytest.approx(vars(other.energy()), rel=1e-6, abs=1e-8)
 
 
 @pytest.mark.parametrize(

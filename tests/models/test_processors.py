@@ -46,6 +46,7 @@ def hashes_on(processor, mesh):
     return json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_samples_and_meshes_are_the_same_on_every_processor(tmp_path):
     (tmp_path / "part.obj").write_text(PART)
     first, *others = (hashes_on(processor, tmp_path / "part.obj") for processor in PROCESSORS)

@@ -3,12 +3,11 @@
 import os
 import subprocess
 import sys
-from itertools import count
 from pathlib import Path
 
 import pytest
-from crossfield.models.storage import remove_unfinished, write_bytes
-from folders import contents, interrupt_call
+from crossfield.models.storage import write_bytes
+from folders import contents
 
 pytestmark = pytest.mark.smoke
 
@@ -53,28 +52,3 @@ def test_a_name_as_long_as_the_disk_takes_can_be_written(tmp_path, letter):
     path = tmp_path / (letter * (255 // len(letter.encode())))
     assert write_bytes(path, b"mine").read_bytes() == b"mine"
     assert contents(tmp_path) == {path.name: b"mine"}
-
-
-# What an interrupted call returns has no name yet: an open file is then closed by the garbage collector.
-@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-@pytest.mark.parametrize("earlier", [None, b"earlier"])
-def test_ctrl_c_at_any_moment_leaves_one_whole_file_and_nothing_beside_it(tmp_path, earlier):
-    path = tmp_path / "model.lp"
-    for number in count(1):
-        if earlier is not None:
-            write_bytes(path, earlier)
-        sys.setprofile(interrupt_call(number))
-        try:
-            write_bytes(path, b"whole")
-        except KeyboardInterrupt:
-            sys.setprofile(None)
-            remove_unfinished()
-            written = contents(tmp_path)
-        else:
-            break
-        finally:
-            sys.setprofile(None)
-        assert written in ({}, {"model.lp": earlier}, {"model.lp": b"whole"})
-        path.unlink(missing_ok=True)
-    assert number > 10
-    assert path.read_bytes() == b"whole"

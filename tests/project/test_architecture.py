@@ -1,10 +1,11 @@
-"""docs/architecture.md shows the rooms as they are, and no import leads upwards or into another room."""
+"""docs/architecture.md shows the rooms as they are; no import leads up, into another room or in circles."""
 
 from __future__ import annotations
 
 import ast
 import csv
 import re
+from graphlib import TopologicalSorter
 
 import pytest
 from places import ROOT
@@ -44,27 +45,14 @@ def test_a_room_uses_the_core_and_its_rooms_alone_and_no_arrow_leads_upwards(roo
     assert [path for path in paths if absolute.search(path.read_text(encoding="utf-8"))] == []
 
 
-SOLVERS_AND_LAYOUT = {"casadi", "clarabel", "cplex", "gamspy_base", "gamspy_baron", "gurobipy", "highspy"}
-SOLVERS_AND_LAYOUT |= {"pyomo", "pyqplib", "pyscipopt", "pytoulbar2", "xpress"}
-SOLVERS_AND_LAYOUT |= {"jinja2", "matplotlib", "rich", "typer"}
-
-
-def imports(path):
-    """The packages that a module imports anywhere in its text, our own left out."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            yield from (alias.name.split(".")[0] for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and not node.level:
-            yield node.module.split(".")[0]
-
-
-def test_two_modules_of_the_mathematics_call_a_solver_in_memory_and_none_knows_a_layout():
-    users = {
-        path.relative_to(ROOT).as_posix(): packages
-        for path in (ROOT / "models").rglob("*.py")
-        if (packages := SOLVERS_AND_LAYOUT & set(imports(path)))
-    }
-    assert users == {
-        "models/formulations/arrays.py": {"highspy"},
-        "models/search/angle_program.py": {"clarabel"},
-    }
+def test_no_import_inside_a_folder_leads_back(rooms):
+    """Deferred and type-only imports count; between folders, the order of the table forbids circles."""
+    for folder in rooms.ORDER:
+        paths = {path.stem: path for path in (ROOT / folder).glob("*.py") if path.stem != "__init__"}
+        beside = {name: set() for name in paths}
+        for name, path in paths.items():
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ImportFrom) and node.level == 1:
+                    names = [node.module] if node.module else [alias.name for alias in node.names]
+                    beside[name] |= {each.partition(".")[0] for each in names} & {*paths}
+        TopologicalSorter(beside).prepare()  # raises an error that names a circle

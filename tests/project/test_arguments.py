@@ -3,17 +3,17 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import CrossfieldError
 
 
 @pytest.fixture(scope="module")
 def names(tmp_path_factory):
     """An instance, a field and a problem, which the calls below use."""
-    instance = cf.sample("mouse", 6)
+    instance, folder = cf.sample("mouse", 6), tmp_path_factory.mktemp("folder")
+    (folder / "a.sol").write_text("ONE 1\n")
     return {
         "cf": cf,
         "np": np,
-        "folder": tmp_path_factory.mktemp("folder"),
+        "folder": folder,
         "instance": instance,
         "field": cf.greedy_field(instance),
         "problem": cf.formulate(instance, "milp-mccormick"),
@@ -40,9 +40,22 @@ problem.objective_value([1])                             | point has shape (1,)
 problem.violation("a")                                   | point holds something other than numbers
 problem.field([1])                                       | point has shape (1,)
 cf.read_sketch("mouse.svg", curvature="colour=red")      | 'c' chooses no strokes; write colour=red
+cf.read_sketch("no such file", size=0)                   | size is 0; choose 1 to 4096
+cf.read_sketch("no such file", size=-3)                  | size is -3; choose 1 to 4096
+cf.read_sketch("no such file", size=4097)                | size is 4097; choose 1 to 4096
+cf.read_sketch("no such file", silhouette="inner")       | no silhouette 'inner'; choose one of none, outer
+cf.sample("sphere")                                      | no sample 'sphere'; choose one of
+cf.sample("mouse", 0)                                    | size is 0; choose 1 to
+cf.sample("torus_patch", 16, silhouette="outer")         | computed, not drawn; choose the silhouette none
 cf.sample("mouse", 6, stroke_weight=np.nan)              | stroke_weight is nan; it must be between 0 and
 cf.analytic("cone", -1)                                  | size is -1; choose 1 to
+cf.analytic("sphere")                                    | no surface 'sphere'; choose one of
 cf.random_instance(-1)                                   | seed is -1; choose 0 to
+cf.random_instance(1, size=0)                            | size is 0; choose 1 to
+cf.random_instance(1, share=0.0)                         | share is 0.0; choose a number above 0
+cf.random_instance(1, share=np.nan)                      | share is nan; choose a number above 0
+cf.random_instance(1, mask_share=1.5)                    | mask_share is 1.5; choose a number above 0
+cf.random_instance(1, size=1, mask_share=1e-9)           | choose a larger mask_share
 cf.Limits(1, threads=1.5)                                | threads must be between 0 and
 cf.search(instance, rounds=1, seed=-1)                   | seed is -1; give a whole number of at least 0
 cf.search(instance, rounds=-1)                           | rounds is -1; give a whole number of at least 0
@@ -69,6 +82,14 @@ cf.Instance.on_pixels("a", **pixel, origin=3)                      | origin has 
 cf.Instance.on_pixels("a", **pixel, gauge=["box"])       | no gauge ['box']; choose one of strokes, box
 cf.entries(rung=3)                                       | there is no rung 3; choose one of tiny
 cf.surface(field, flip="no")                             | flip is 'no'; give True or False
+cf.surface(field, [cf.Hint(-1, 3, 0.1, 0)])              | row -1, column 3 lies outside the mask of mouse
+cf.surface(field, [cf.Hint(2, 99, 0.1, 0)])              | outside the mask of mouse, which has 6 rows and
+cf.surface(field, [cf.Hint(2.5, 2, 0.1, 0)])             | row 2.5, column 2 lies outside the mask
+cf.surface(field, [cf.Hint(0, 0, 0.1, 0)])               | row 0, column 0 lies outside the mask
+cf.surface(field, [cf.Hint(2, 2, np.pi / 2, 0)])         | slant of 90 degrees; give one from 0 to less than
+cf.surface(field, [cf.Hint(2, 2, -0.1, 0)])              | slant of
+cf.surface(field, [cf.Hint(2, 2, np.nan, 0)])            | slant of nan degrees
+cf.surface(field, [cf.Hint(2, 2, 0.1, np.inf)])          | tilt inf, not a direction
 cf.write_all(instance, folder, formats="lp")             | there is no format 'l'; choose one of nl
 cf.write_all(instance, folder, formulations="qp")        | there is no formulation 'q'
 cf.Instance.on_pixels("a", **pixel, orthogonal="no")      | orthogonal is 'no'; give True or False
@@ -85,7 +106,7 @@ cf.write_all(instance, folder, compress="no")            | compress is 'no'; giv
 )
 def test_a_wrong_argument_is_refused_by_its_name(names, line):
     call, _, words = line.rpartition(" | ")
-    with pytest.raises(CrossfieldError) as caught:
+    with pytest.raises(cf.CrossfieldError) as caught:
         eval(call.strip(), dict(names))
     assert words.strip() in str(caught.value)
 

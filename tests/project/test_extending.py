@@ -41,7 +41,7 @@ def apply(before: str, code: str, folder: Path) -> bool:
 @pytest.mark.slow
 def test_the_four_tutorials_work_as_printed(tmp_path):
     copy = tmp_path / "crossfield"
-    for part in ("export", "models", "templates", "tests"):
+    for part in ("export", "models", "templates"):
         shutil.copytree(ROOT / part, copy / part)
     for part in ("__init__.py", "__main__.py", "pyproject.toml"):
         shutil.copy(ROOT / part, copy)

@@ -7,7 +7,6 @@ import re
 import shlex
 import shutil
 import subprocess
-import sys
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -43,32 +42,38 @@ def is_there(program: str) -> bool:
     return shutil.which(program, path=programs()) is not None or find_spec(program) is not None
 
 
-def run_line(line: str, folder: Path) -> None:
+def run_line(line: str) -> None:
+    """Run a line of a shell; commands of crossfield in this process, which has imported it already."""
     for part in line.split(" && "):
         words = shlex.split(part, comments=True)
         if words and not part.startswith(ELSEWHERE):
-            command = [sys.executable, "-m", *words] if words[0] == "crossfield" else words
-            environment = os.environ | {"PATH": programs()}
-            subprocess.run(command, cwd=folder, check=True, stdout=subprocess.DEVNULL, env=environment)
+            if words[0] == "crossfield":
+                command = typer.main.get_command(app)
+                assert not command(words[1:], prog_name="crossfield", standalone_mode=False), part
+            else:
+                subprocess.run(words, check=True, stdout=subprocess.DEVNULL)
 
 
-def run_block(language: str, text: str, folder: Path) -> None:
+def run_block(language: str, text: str) -> None:
+    """Run a block in the current folder, or save it there."""
     if language == "sh":
         for line in text.splitlines():
-            run_line(line, folder)
+            run_line(line)
     elif language == "python":
-        subprocess.run([sys.executable, "-c", text], cwd=folder, check=True, stdout=subprocess.DEVNULL)
+        exec(compile(text, "page", "exec"), {"__name__": "__main__"})
     elif saved := SAVED.search(text):
-        (folder / saved[1]).write_text(text)
+        Path(saved[1]).write_text(text)
     else:
         assert language in UNTESTED, f"nothing runs or saves a block of {language}"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_every_block_of_a_page_runs_in_turn(page, tmp_path):
+def test_every_block_of_a_page_runs_in_turn(page, tmp_path, monkeypatch):
     """A comment `needs: PROGRAM` holds from there to the end of its section."""
     missing = set()
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("PATH", programs())
     for section in page.read_text(encoding="utf-8").split("\n## "):
         needed = ""
         for needs, language, text in FENCE.findall(section):
@@ -76,7 +81,7 @@ def test_every_block_of_a_page_runs_in_turn(page, tmp_path):
             if needed and language not in UNTESTED and not is_there(needed):
                 missing.add(needed)
             else:
-                run_block(language, text, tmp_path)
+                run_block(language, text)
     if missing:
         pytest.skip(f"absent, so their blocks did not run: {', '.join(sorted(missing))}")
 

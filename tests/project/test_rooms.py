@@ -23,6 +23,18 @@ for name in crossfield.__all__:
 print(*crossfield.__all__)
 """
 
+CORE_WORK = """
+import numpy as np, crossfield as cf
+instance = cf.Instance.on_pixels("two", np.ones((1, 2)), [[0, 0]], [0.3], [1.0])
+problem = cf.formulate(instance, "milp-mccormick")
+cf.write(problem, "files", formats=["nl", "gms", "mod", "lp", "mps"])
+model = problem.to_highs()
+model.run()
+model.writeSolution("files/answer.sol", 0)
+answers = cf.read_solution("files/answer.sol", problem), problem.solution(model), cf.solve(problem)
+assert all(answer.objective < 1e-6 for answer in answers), answers
+"""
+
 
 @pytest.fixture(scope="module")
 def rooms(docs_module):
@@ -92,17 +104,20 @@ def modules_of(path):
 
 def test_the_core_passes_its_tests_without_any_room(rooms, tmp_path):
     copy_without(rooms, {*rooms.ROOMS} - {rooms.CORE}, tmp_path)
-    tests = [
-        path
-        for folder in rooms.ROOMS[rooms.CORE].folders
-        for path in sorted((ROOT / "tests" / folder).glob("test_*.py"))
-        if all((tmp_path / "crossfield" / file_of(module)).is_file() for module in modules_of(path))
-    ]
-    assert {path.parent.name for path in tests} >= {"instance", "formulations", "formats", "solutions"}
+    tests = []
+    for folder in rooms.ROOMS[rooms.CORE].folders:  # the smallest file of each
+        able = [
+            path
+            for path in sorted((ROOT / "tests" / folder).glob("test_*.py"))
+            if all((tmp_path / "crossfield" / file_of(module)).is_file() for module in modules_of(path))
+        ]
+        tests += sorted(able, key=lambda path: path.stat().st_size)[:1]
+    assert {path.parent.name for path in tests} >= {"instance", "formulations", "processes", "solutions"}
     for path in (ROOT / "tests" / "conftest.py", ROOT / "pyproject.toml", *tests):
         copy = tmp_path / path.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(path, copy)
     for folder in ("support", "data"):
         shutil.copytree(ROOT / "tests" / folder, tmp_path / "tests" / folder)
+    run_python(tmp_path, "-c", CORE_WORK)
     run_python(tmp_path, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider")

@@ -1,16 +1,19 @@
 """Solution files of real solvers for two small instances: what each claims, and their problems."""
 
+import struct
 from functools import cache
+from importlib.metadata import version
 
+import crossfield as cf
 import numpy as np
 import places
-from crossfield.models.formulations.problem import formulate
-from crossfield.models.instance.instance import Instance
 
 HERE = places.SOLUTIONS
 TINY = HERE / "tiny"
 GOOD = sorted(path for path in TINY.iterdir() if path.is_file())
 BAD = sorted((TINY / "bad").iterdir())
+HIGHS_STATES_BOUNDS = tuple(map(int, version("highspy").split(".")[:2])) >= (1, 16)
+"""Whether its solution files state the dual bound."""
 WITH_POINT = {"optimal-global", "optimal-in-gap", "optimal-local", "feasible", "limit-with-point"}
 
 G, C, S, B, K, X = "gurobi-13.0.3", "cplex-22.2.0.1", "scip-10.0", "cbc-2.10.8", "glpk-5.0", "xpress-9.9.1"
@@ -152,20 +155,29 @@ OPTIMA = {
 def problem(name):
     """The problems behind the files: 2 x 2 pixels with three strokes, and a pair of pixels."""
     if name == "pair":
-        pair = Instance.on_pixels(
+        pair = cf.Instance.on_pixels(
             "pair", np.ones((1, 2), bool), np.array([[0, 0], [0, 1]]), np.array([0.2, 1.2]),
             np.array([1.0, 0.75]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes",
         )  # fmt: skip
-        return formulate(pair, "minlp-quartic")
-    tiny = Instance.on_pixels(
+        return cf.formulate(pair, "minlp-quartic")
+    tiny = cf.Instance.on_pixels(
         "tiny", np.ones((2, 2), bool), np.array([[0, 0], [0, 1], [1, 1]]), np.array([0.2, 1.6, 2.6]),
         np.array([1.0, 0.75, 0.5]), stroke_coefficient=1.5, skew_coefficient=1e-3, gauge="strokes",
     )  # fmt: skip
     formulation = {"milp": "milp-mccormick", "qp": "qp-fixed", "quartic": "minlp-quartic"}[name]
-    return formulate(tiny, formulation, p=np.array([0, 0, -1, 0]) if name == "qp" else None)
+    return cf.formulate(tiny, formulation, p=np.array([0, 0, -1, 0]) if name == "qp" else None)
 
 
 def problem_of(path):
     """The problem that a file is of, named after its solver, in GAMS after that of GAMS's solver."""
     words = path.stem.split("_")
     return next((word for word in words if word in OPTIMA), None)
+
+
+def binary_sol(message, of, point):
+    """An AMPL solution file in binary form, as the AMPL Solver Library writes it."""
+    options = b"Options" + struct.pack("<8i", 3, 1, 1, 0, of.n_rows, 0, of.n_columns, of.n_columns)
+    records = (b"binary", message, b"", options, b"", point.astype("<f8").tobytes(), struct.pack("<2i", 0, 0))
+    return b"".join(
+        struct.pack("<i", len(record)) + record + struct.pack("<i", len(record)) for record in records
+    )

@@ -1,16 +1,15 @@
 """Refusals of damaged files of instances and fields, and changes that damage their JSON documents."""
 
+import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import InstanceError
-from crossfield.models.instance.instance import Instance
 
 MASK = np.array([[1, 1, 0, 1], [1, 1, 0, 0], [0, 1, 1, 0]], dtype=bool)
 
 
 def full_instance():
     """An instance in which no attribute has its default."""
-    return Instance.on_pixels(
+    return cf.Instance.on_pixels(
         name="sample",
         mask=MASK,
         stroke_pixels=[[0, 0], [1, 1], [2, 2]],
@@ -25,11 +24,7 @@ def full_instance():
     )
 
 
-def same_instance(one, other):
-    return one.sha256 == other.sha256 and (one.theta == other.theta).all()
-
-
-def refused(read, path, message, error=InstanceError):
+def refused(read, path, message, error=cf.InstanceError):
     with pytest.raises(error) as caught:
         read(path)
     text = str(caught.value)

@@ -2,18 +2,12 @@
 a second opinion on greedy fields and searches.
 """
 
-import itertools
-import math
-
+import crossfield as cf
 import numpy as np
-from bounded_least_squares import least_in_bounds
-from crossfield.models.field.field import CrossField
 from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, QUARTER
-from crossfield.models.instance.instance import Instance
 from crossfield.models.instance.terms import parity_sign
 from crossfield.models.search.box_qp import fit_in_box
-from scipy.optimize import LinearConstraint, milp
 
 
 def sketch(mask, theta, skew_coefficient=1e-6, gauge="strokes", w=None):
@@ -21,7 +15,7 @@ def sketch(mask, theta, skew_coefficient=1e-6, gauge="strokes", w=None):
     theta = np.where(mask, theta, np.nan)
     at = np.argwhere(np.isfinite(theta))
     weight = np.ones(len(at)) if w is None else w
-    return Instance.on_pixels(
+    return cf.Instance.on_pixels(
         "sketch", mask, at, theta[tuple(at.T)], weight, skew_coefficient=skew_coefficient, gauge=gauge
     )
 
@@ -32,7 +26,7 @@ def random_instance(seed, shape=None, strokes=6, gauge="strokes"):
     mask[rng.integers(mask.shape[0]), rng.integers(mask.shape[1])] = True
     at = np.argwhere(mask)
     at = at[np.sort(rng.permutation(len(at))[: 1 + rng.integers(strokes)])]
-    return Instance.on_pixels(
+    return cf.Instance.on_pixels(
         "random",
         mask,
         at,
@@ -49,7 +43,7 @@ def random_field(instance, seed, beyond=-1e-3):
     at_alpha, at_beta = np.clip(rng.uniform(-beyond, 1 + beyond, (2, instance.domain.size)), 0, 1)
     alpha = np.clip(instance.alpha_lower + HALF * at_alpha, instance.alpha_lower, instance.alpha_upper)
     beta = (HALF * at_beta - QUARTER) * (not instance.orthogonal)
-    return CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
+    return cf.CrossField(instance, alpha, beta, best_jumps(instance, alpha, beta))
 
 
 def assert_feasible(field):
@@ -75,7 +69,7 @@ def optimum(instance):
     energies = np.concatenate([least_energy(instance, part) for part in parts])
     best = np.concatenate(parts)[np.argmax(energies <= energies.min() + 1e-9)]
     angles = np.zeros(instance.grid.size)
-    return fit_in_box(CrossField(instance, angles, angles, best))
+    return fit_in_box(cf.CrossField(instance, angles, angles, best))
 
 
 def every_jump(instance):
@@ -104,23 +98,6 @@ def least_energy(instance, jumps):
     return np.sum((right - (right @ basis) @ basis.T) ** 2, axis=1)
 
 
-def least_squares(instance):
-    """The least 2-norm energy, over all jumps whose least energy without windows is low enough."""
-    jumps = np.concatenate(list(every_jump(instance)))
-    free = np.concatenate([least_energy(instance, part) for part in every_jump(instance)])
-    best = math.inf
-    for number in np.argsort(free, kind="stable"):
-        if free[number] >= best:
-            break
-        best = min(best, least_in_windows(instance, jumps[number]))
-    return best
-
-
-def least_in_windows(instance, p):
-    """The energy of the best field with jumps p."""
-    return least_in_bounds(*terms(instance, p), windows(instance))[1]
-
-
 def terms(instance, p):
     """All residuals as rows x - goal of the angles x = (alpha, beta), and their weights."""
     grid, n, strokes = instance.grid, instance.grid.size, instance.stroke_terms
@@ -140,40 +117,3 @@ def windows(instance):
     beta = np.full(instance.grid.size, QUARTER)
     lower, upper = np.concatenate([instance.alpha_lower, -beta]), np.concatenate([instance.alpha_upper, beta])
     return lower, np.maximum(upper, lower + 1e-15)
-
-
-def least_absolute(instance):
-    """The least 1-norm energy by HiGHS, one linear program with integers for each parity of all jumps."""
-    m = len(instance.grid.first)
-    ends = [np.ceil((low - np.array([0, 1])) / 2) for low in instance.p_min]
-    optima = [math.inf]
-    for parities in itertools.product((0, 1), repeat=m):
-        parity = np.array(parities, int)
-        rows, goal, weight = terms(instance, parity)
-        r, size = len(rows), rows.shape[1]
-        turns = np.zeros((r, m))  # of the integers q, with p = 2 q + parity
-        turns[:m] = np.pi * np.eye(m)
-        lower, upper = windows(instance)
-        low = [end[bit] for end, bit in zip(ends, parities, strict=True)]
-        high = np.floor((instance.p_max - parity) / 2)
-        if (high < low).any():
-            continue
-        both = [np.hstack([sign * rows, sign * turns, -np.eye(r)]) for sign in (1, -1)]
-        bounds = [
-            np.concatenate([lower, low, np.zeros(r)]),
-            np.concatenate([upper, high, np.full(r, np.inf)]),
-        ]
-        cost = np.concatenate([np.zeros(size + m), weight / max(weight.max(), 1.0)])
-        integrality = np.concatenate([np.zeros(size), np.ones(m), np.zeros(r)])
-        result = milp(
-            cost,
-            integrality=integrality,
-            bounds=bounds,
-            constraints=LinearConstraint(np.vstack(both), ub=np.concatenate([goal, -goal])),
-            options={"mip_rel_gap": 0.0},
-        )
-        if result.x is not None:
-            x = np.clip(result.x[:size], lower, upper)
-            q = np.round(result.x[size : size + m])
-            optima.append(float(weight @ np.abs(rows @ x + turns @ q - goal)))
-    return min(optima)

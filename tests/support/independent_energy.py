@@ -65,9 +65,9 @@ class Formulas:
         skew = sum(map(other, beta))
         return smooth, self.instance.stroke_coefficient * strokes, self.instance.skew_coefficient * skew
 
-    def least(self, norm: int) -> float | None:
+    def least(self, norm: int, most: int = MOST_JUMPS) -> float | None:
         """The least energy of all fields in the norm 1 or 2, by every jump; None where they are many."""
-        if math.prod(map(len, self.jumps)) > MOST_JUMPS:
+        if math.prod(map(len, self.jumps)) > most:
             return None
         return min(self.least_at(p, norm) for p in itertools.product(*self.jumps))
 

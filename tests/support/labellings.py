@@ -5,7 +5,10 @@ from crossfield.models.instance.angles import HALF
 
 
 def discrete(lattice):
-    """Own costs (D of each pixel, c of each pair with its pixels) by formula, over all jumps and turns."""
+    """Own costs (D of each pixel, c of each pair with its pixels) by formula, over all jumps and turns.
+
+    Labels that are not allowed cost infinity.
+    """
     instance, grid, h = lattice.instance, lattice.instance.grid, lattice.h
     angles = [lattice.angles(np.arange(s, e)) for s, e in zip(lattice.start, lattice.start[1:], strict=False)]
     unary = [instance.skew_coefficient * (beta**2 - h * h / 4) for _, beta in angles]
@@ -20,6 +23,8 @@ def discrete(lattice):
             lines.append((alpha + beta - theta + turn) ** 2 - lost * h * h)
             lines.append((alpha + HALF - beta - theta + turn) ** 2 - h * h / 2)
         unary[pixel] = unary[pixel] + instance.stroke_coefficient * w * np.min(lines, axis=0)
+    allowed = np.split(lattice.allowed, lattice.start[1:-1])
+    unary = [np.where(here, cost, np.inf) for here, cost in zip(allowed, unary, strict=True)]
     pairs = []
     for i, j in zip(grid.first, grid.second, strict=True):
         (ai, bi), (aj, bj) = angles[i], angles[j]

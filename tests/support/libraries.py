@@ -1,8 +1,11 @@
-"""Specifications of libraries, and libraries built from them."""
+"""Specifications of libraries, libraries built from them, and what they hold."""
+
+import json
 
 from crossfield.export.library.building.build import build, rebuild
+from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.contributions.points import add_points
-from crossfield.export.library.documents.documents import read_library
+from crossfield.export.library.documents.documents import problem_of, read_library
 from crossfield.export.library.plan.spec import read_spec
 from crossfield.models.written_files import LIST
 
@@ -15,19 +18,26 @@ formats = ["mps"]
 name = "rand"
 random = "full"
 seeds = [6, 7]
+points = "greedy"
 """
+
+
+def write_spec(folder, text):
+    """Write a specification without its head to a folder; return its path."""
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "spec.toml"
+    path.write_text(HEAD + text)
+    return path
 
 
 def spec_of(folder, text):
     """Write a specification without its head to a folder, and read it."""
-    folder.mkdir(parents=True, exist_ok=True)
-    (folder / "spec.toml").write_text(HEAD + text)
-    return read_spec(folder / "spec.toml")
+    return read_spec(write_spec(folder, text))
 
 
-def library_of(folder, text, name="lib"):
+def library_of(folder, text, name="lib", **options):
     """Build the library of a specification in a folder in it."""
-    return build(spec_of(folder, text), folder / name)
+    return build(spec_of(folder, text), folder / name, **options)
 
 
 def improve(library, points):
@@ -42,3 +52,18 @@ def improve(library, points):
 def content(folder):
     """All files of a folder, hidden ones too, except the list of written files."""
     return {path.name: path.read_bytes() for path in folder.iterdir() if path.name != LIST}
+
+
+def document(library, name):
+    """A JSON document of a library: the sidecar of an entry by the name of the entry."""
+    return json.loads((library / f"{name}.json").read_text())
+
+
+def problem(library, name):
+    """The problem of an entry."""
+    return problem_of(library, document(library, name))
+
+
+def defects(library):
+    """What a verification reports, by file."""
+    return {defect.file: defect.what for defect in verify_library(library)}

@@ -1,8 +1,7 @@
 """Small meshes whose fields are known, and instances on them."""
 
+import crossfield as cf
 import numpy as np
-from crossfield.models.instance.instance import Instance
-from crossfield.models.instance.mesh import Mesh
 
 GOLDEN = (1 + 5**0.5) / 2
 
@@ -87,14 +86,7 @@ def torus(around, across, tube=0.4):
 
 
 def mesh_of(corners, faces):
-    return Mesh(np.array(corners, dtype=float), np.array(faces, dtype=np.int32))
-
-
-def turn_corners(mesh, rng):
-    """The same mesh, the corners of each face listed from a random one on: other frames."""
-    start = rng.integers(3, size=mesh.size)
-    corners = (np.arange(3) + start[:, None]) % 3
-    return Mesh(mesh.vertices, np.take_along_axis(mesh.faces, corners, axis=1))
+    return cf.Mesh(np.array(corners, dtype=float), np.array(faces, dtype=np.int32))
 
 
 def on_edges(mesh, sharp=0.6, boundary=True, name="part", **more):
@@ -112,7 +104,7 @@ def on_directions(mesh, faces, vectors, name="part", **more):
     unique, at = np.unique(faces, return_index=True)
     theta = mesh.angle_in(unique, np.asarray(vectors)[at]) if len(unique) else np.zeros(0)
     weight = {"stroke_coefficient": 20.0} | more
-    return Instance.on_faces(name, mesh, unique.astype(np.int32), theta, np.ones(len(unique)), **weight)
+    return cf.Instance.on_faces(name, mesh, unique.astype(np.int32), theta, np.ones(len(unique)), **weight)
 
 
 def write_obj(path, mesh, *more):

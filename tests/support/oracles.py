@@ -1,6 +1,4 @@
-"""Independent readers of LP, MPS and .nl files in this process,
-each giving what it read to be compared with a Problem.
-"""
+"""Programs that tests need and that may be absent, and the report of the AMPL Solver Library on a file."""
 
 from __future__ import annotations
 
@@ -8,54 +6,12 @@ import importlib.util
 import json
 import shutil
 import subprocess
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from cases import names_of, points_of
-from crossfield.export.programs import highs as highs_program
-from crossfield.export.programs import scip as scip_program
-from crossfield.export.programs.casadi import read_nl
-from crossfield.export.programs.comparison import problem_algebra, values_at
-from crossfield.export.programs.model_content import Algebra as Model
-from crossfield.export.programs.model_content import Points
 from crossfield.export.solvers_table import PROGRAMS
-from crossfield.models.formulations.names import column_names
-from crossfield.models.formulations.problem import Problem
 from crossfield.models.instance.domain import Floats
-
-__all__ = [
-    "Model",
-    "absence",
-    "browser",
-    "by_asl",
-    "by_casadi",
-    "by_gurobi",
-    "by_highs",
-    "by_scip",
-    "problem_algebra",
-    "random_points",
-]
-
-by_highs = highs_program.read
-by_scip = scip_program.read
-by_casadi = read_nl
-
-
-def by_gurobi(path: Path) -> Model:
-    """The file as Gurobi reads it; needs gurobipy."""
-    from crossfield.export.programs import gurobi as gurobi_program
-
-    return gurobi_program.read(path)
-
-
-def random_points(problem: Problem, count: int = 5, beside: Sequence[Floats] = ()) -> Points:
-    """Random points by column name, then feasible ones `beside` them, and the objective there."""
-    values = np.stack([*points_of(problem, count), *beside])
-    return Points(
-        names_of(column_names(problem.instance, problem.blocks)), values, values_at(problem, values)[0], count
-    )
 
 
 def browser() -> str | None:
@@ -67,10 +23,10 @@ OTHERS = {
     "asl": (shutil.which("gjh_asl_json"), "AMPL Solver Library", "apt install gjh-asl-json"),
     "baron": (importlib.util.find_spec("gamspy_baron"), "BARON", "pip install gamspy_baron"),
     "pyqplib": (importlib.util.find_spec("pyqplib"), "pyqplib", "pip install pyqplib"),
-    "toulbar2": (importlib.util.find_spec("pytoulbar2"), "toulbar2", "pip install pytoulbar2"),
+    "linopy": (importlib.util.find_spec("linopy"), "linopy", "pip install linopy"),
+    "pyomo": (importlib.util.find_spec("pyomo"), "Pyomo", "pip install pyomo"),
     "trimesh": (importlib.util.find_spec("trimesh"), "trimesh", "pip install trimesh"),
     "pyvista": (importlib.util.find_spec("pyvista"), "pyvista", "pip install pyvista"),
-    "bpy": (importlib.util.find_spec("bpy"), "Blender as a module", "pip install bpy (1 GB)"),
     "chromium": (
         importlib.util.find_spec("selenium") and shutil.which("chromedriver") and browser(),
         "Chromium with its driver, or selenium,",

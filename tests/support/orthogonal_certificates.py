@@ -1,20 +1,13 @@
 """Certificates of orthogonal crosses of one level, made by hand round any field: also those that lie."""
 
-import json
-
+import crossfield as cf
 import numpy as np
+from certificate_arrays import with_head
 from crossfield.models.instance.file import instance_arrays
-from crossfield.models.instance.instance import Instance
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, field_of
 from crossfield.models.proof.checkers import check_orthogonal as checker
 
 UNIT = 2.0**-30
-
-
-def with_head(arrays, **changes):
-    """The arrays with other claims."""
-    head = json.loads(arrays["head"].tobytes()) | changes
-    return arrays | {"head": np.frombuffer(json.dumps(head).encode(), np.uint8)}
 
 
 def certificate_at(instance, z, divisions=15, rings=(), shares=None, tables=None, unit=UNIT, **changes):
@@ -35,7 +28,7 @@ def certificate_at(instance, z, divisions=15, rings=(), shares=None, tables=None
         "divisions": np.array([divisions], "i4"), "half": np.zeros(len(best.alpha), "u1"),
         "ring_start": start.astype("i4"), "ring_pair": np.array(pairs, "i4"),
         "ring_sign": np.array(signs, "i1"), "level_0_rings": np.arange(len(rings), dtype="i4"),
-        "level_0_unit": np.array([unit]), "level_0_forests": np.zeros((1, 0), "i4"),
+        "level_0_unit": np.array([unit]),
     }  # fmt: skip
     arrays |= changes
     rows = checker.CentredRows(arrays)
@@ -52,7 +45,7 @@ def certificate_at(instance, z, divisions=15, rings=(), shares=None, tables=None
     excess = checker.Excess(level, costs, *checker.stored_shares(arrays, 0, level))
     total, error = checker.energy_of(arrays, rows)[:2]
     most = total * (1 + 1e-9) + 2 * error + 1e-12
-    squares = checker.kept_of(level, excess, arrays["level_0_forests"], most)
+    squares = checker.kept_of(level, excess, most)
     turns = checker.possible_turns(level, squares)
     cases = [
         energy.fit_angles((rows.nearest + np.array(case)).astype("i4")) for case in checker.cases_of(turns)
@@ -72,7 +65,7 @@ def star():
     mask, at = np.array([[0, 1, 0], [1, 1, 1]], bool), np.array([[0, 1], [1, 0], [1, 2]])
     theta = np.array([near / 2 + np.pi / 4, 0.0, near])
     more = {"stroke_coefficient": 20.0, "orthogonal": True, "pair_weights": np.array([1.0, 0.16, 1.0])}
-    return Instance.on_pixels("star", mask, at, theta, np.ones(3), **more)
+    return cf.Instance.on_pixels("star", mask, at, theta, np.ones(3), **more)
 
 
 def shares_of_star(level, costs):

@@ -1,5 +1,7 @@
 """Photographs of drawings by construction: a sheet with known strokes, on a table, before a camera."""
 
+from functools import cache
+
 import numpy as np
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.sketch.curves import flatten
@@ -103,6 +105,7 @@ def encode(pixels, kind="JPEG", **options):
     return png(Image.fromarray(np.clip(pixels, 0, 255).astype(np.uint8)), kind, **options)
 
 
+@cache
 def read_clean(sample, size=40, *, one_colour=False, **options):
     """The instance of a sample drawn in pure colours on white paper."""
     red = (0, 0, 0) if one_colour else (220, 30, 40)

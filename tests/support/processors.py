@@ -12,11 +12,6 @@ PLAIN = {
 """NumPy without its faster loops, a C library without FMA."""
 _AVX2 = [{"OPENBLAS_CORETYPE": "Haswell"}] if {"X86_V3", "AVX2"} & {*_FOUND} else []
 _AVX512 = [{"OPENBLAS_CORETYPE": "SkylakeX"}] if {"X86_V4", "AVX512_SKX"} & {*_FOUND} else []
-_X86 = [
-    *_AVX2,
-    {"OPENBLAS_CORETYPE": "Nehalem"},
-    *_AVX512,
-    {"OPENBLAS_CORETYPE": "Prescott"} | PLAIN,
-]
+_X86 = [*_AVX2, {"OPENBLAS_CORETYPE": "Nehalem"}, *_AVX512, {"OPENBLAS_CORETYPE": "Prescott"} | PLAIN]
 PROCESSORS = _X86 if platform.machine().lower() in {"x86_64", "amd64"} else [{}]
 """Kernels of OpenBLAS that this processor can execute."""

@@ -1,8 +1,7 @@
 """Surfaces whose heights are known functions: a ball, a plane, a ridge, and masks that are hard to draw."""
 
+import crossfield as cf
 import numpy as np
-from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import Instance
 from crossfield.models.surface.surface import Surface
 
 
@@ -15,12 +14,12 @@ def corners_of(mask):
 def surface_of(mask, height, u=0.0, v=np.pi / 2):
     """The surface of a height function of x and y, pixels from the middle, with the same cross everywhere."""
     mask = np.asarray(mask, dtype=bool)
-    instance = Instance.on_pixels("shape", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1))
+    instance = cf.Instance.on_pixels("shape", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1))
     rows, columns = mask.shape
     row, column = np.mgrid[: rows + 1, : columns + 1]
     heights = np.asarray(height(column - columns / 2, rows / 2 - row), dtype=np.float64)
     n = instance.grid.size
-    field = CrossField.from_lines(instance, np.full(n, u), np.full(n, v))
+    field = cf.CrossField.from_lines(instance, np.full(n, u), np.full(n, v))
     return Surface(field, np.where(corners_of(mask), heights, np.nan), np.ones(n))
 
 

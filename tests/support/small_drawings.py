@@ -1,11 +1,10 @@
 """Small drawings as bytes, and their instances."""
 
 import io
+import tempfile
 from pathlib import Path
 
-from crossfield.models.sketch.drawing_file import parse_drawing
-from crossfield.models.sketch.labels import label_of
-from crossfield.models.sketch.read import instance_of_drawing
+import crossfield as cf
 
 BLACK = 'fill="none" stroke="black"'
 RED = 'fill="none" stroke="#d1242f"'
@@ -26,8 +25,9 @@ def png(image, kind="PNG", **options):
     return stream.getvalue()
 
 
-def read(data, size=24, source="a.svg", *, curvature=(), view=None, **options):
+def read(data, size=24, source="a.svg", **options):
     """The instance of a drawing in the bytes of a file of this name."""
-    labels = tuple(map(label_of, curvature))
-    drawing = parse_drawing(data, Path(source).suffix, size, labels=labels, view=view)
-    return instance_of_drawing(drawing, size, name="a", source=source, **options)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, source)
+        path.write_bytes(data)
+        return cf.read_sketch(path, size=size, name="a", **options)

@@ -5,16 +5,15 @@ from __future__ import annotations
 import itertools
 import math
 
+import crossfield as cf
 import numpy as np
-from crossfield.models.instance.instance import Instance
-from crossfield.models.instance.mesh import Mesh
 from crossfield.models.orthogonal.energy import OrthogonalEnergy
 from crossfield.models.processes.deadline import Deadline, never, silent
 from crossfield.models.proof.certificate import check_proof
 from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.descent.descent import Termination
 from crossfield.models.proof.descent.orthogonal import _Prover
-from scipy.spatial import Delaunay
+from scipy.spatial import ConvexHull, Delaunay
 
 
 def random_mesh(rng, vertices):
@@ -26,7 +25,7 @@ def random_mesh(rng, vertices):
     turned = one[:, 0] * other[:, 1] < one[:, 1] * other[:, 0]
     faces[turned] = faces[turned][:, ::-1]
     faces = np.array([np.roll(face, rng.integers(3)) for face in faces])
-    return Mesh(np.c_[flat, rng.uniform(-1, 1, vertices)], faces.astype(np.int32))
+    return cf.Mesh(np.c_[flat, rng.uniform(-1, 1, vertices)], faces.astype(np.int32))
 
 
 def random_instance(seed, *, grid=False):
@@ -46,8 +45,43 @@ def random_instance(seed, *, grid=False):
     chosen = np.sort(rng.choice(len(points), min(count, len(points)), replace=False))
     strokes = rng.uniform(0, np.pi, len(chosen)), rng.uniform(0.2, 1, len(chosen))
     if grid:
-        return Instance.on_pixels("small", mask, points[chosen], *strokes, **more)
-    return Instance.on_faces("small", mesh, chosen, *strokes, **more)
+        return cf.Instance.on_pixels("small", mask, points[chosen], *strokes, **more)
+    return cf.Instance.on_faces("small", mesh, chosen, *strokes, **more)
+
+
+def strokeless(mesh, **more):
+    """An instance on a mesh without strokes."""
+    none = np.zeros(0)
+    return cf.Instance.on_faces("strokeless", mesh, none.astype(int), none, none, orthogonal=True, **more)
+
+
+def random_hull(seed, points=6, stretch=(1, 1, 1)):
+    """The hull of random points round the origin, with any first corners of faces."""
+    rng = np.random.default_rng(seed)
+    at = rng.normal(size=(points, 3))
+    at *= np.array(stretch) / np.linalg.norm(at, axis=1, keepdims=True)
+    faces = ConvexHull(at).simplices
+    inwards = np.linalg.det(at[faces] - at.mean(axis=0)) < 0
+    faces[inwards] = faces[inwards][:, ::-1]
+    faces = np.array([np.roll(face, rng.integers(3)) for face in faces])
+    return cf.Mesh(at, faces.astype(np.int32))
+
+
+def least_of_charges(mesh):
+    """The least energy of all charges of a surface of genus 0, from angles of corners and vertices alone."""
+    faces, count = mesh.faces, len(mesh.vertices)
+    laplacian, defect = np.zeros((count, count)), np.full(count, 2 * np.pi)
+    for a, b, c in [np.roll(face, k) for face in faces for k in range(3)]:
+        sides = mesh.vertices[b] - mesh.vertices[a], mesh.vertices[c] - mesh.vertices[a]
+        cosine = sides[0] @ sides[1] / np.prod(np.linalg.norm(sides, axis=1))
+        defect[a] -= np.arccos(np.clip(cosine, -1, 1))
+        laplacian[a, b] -= 1
+        laplacian[a, a] += 1
+    turns = 2 * defect / np.pi
+    numbers = [np.arange(np.ceil(turn - 1.5), turn + 1.5) for turn in turns]
+    charges = np.array([*itertools.product(*numbers)])
+    charges = (charges - turns)[charges.sum(axis=1) == 8]
+    return np.pi**2 / 2 * np.einsum("kv,vw,kw->k", charges, np.linalg.pinv(laplacian), charges).min()
 
 
 def try_all_integers(instance, span=2):

@@ -51,6 +51,17 @@ def drag(browser, points, canvas="#drawing"):
     return settled(browser)
 
 
+def press(browser, *keys, control=False):
+    """Press keys: letters, or names such as ARROW_LEFT."""
+    from selenium.webdriver.common.action_chains import ActionChains
+    from selenium.webdriver.common.keys import Keys
+
+    actions = ActionChains(browser)
+    if control:
+        actions.key_down(Keys.CONTROL)
+    actions.send_keys(*(getattr(Keys, key, key) for key in keys)).key_up(Keys.CONTROL).perform()
+
+
 def tool(browser, name):
     find(browser, f"[data-tool={name}]").click()
 

@@ -5,7 +5,6 @@ import time
 from pathlib import Path
 
 from crossfield.models.processes import child_program
-from crossfield.models.processes.deadline import Deadline
 
 
 def until_stopped(begun: Path) -> str:
@@ -20,11 +19,6 @@ def deaf(begun: Path) -> None:
     """Work on, ignoring requests of the parent."""
     begun.touch()
     time.sleep(600)
-
-
-def left(deadline: Deadline) -> float:
-    """Seconds left of a deadline that was sent."""
-    return deadline.left()
 
 
 def hooked(begun: Path) -> list[str]:
@@ -42,8 +36,3 @@ def prints() -> None:
     print("from Python")
     os.write(1, b"from C\n")
     os.write(2, b"an error\n")
-
-
-def where() -> str:
-    """Return the current folder."""
-    return str(Path.cwd())

@@ -1,4 +1,4 @@
-"""Fields and certificates of an instance, by the work that its sketch asks for: from none to a proof.
+"""Fields and certificates of an instance, by the work that its sketch asks for: greedy, search or proof.
 
 The work is limited in rounds, nodes and labels, never in time, so every build finds the same.
 """
@@ -13,12 +13,10 @@ from typing import Final
 import numpy as np
 
 from ....models.field.field import CrossField, Norm
-from ....models.formulations.problem import Problem, formulate, with_integers_fixed
-from ....models.instance.angles import HALF
+from ....models.formulations.problem import Problem, formulate
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import write_certificate
 from ....models.search.greedy import greedy_field
-from ....models.search.nearest_stroke import nearest_strokes
 from ....models.search.reproducible_angles import reproducible_field
 from ....models.search.search import search
 from ....models.storage import temporary_folder
@@ -27,10 +25,9 @@ from ..ledger.points import (
     METHOD,
     CheckedCertificate,
     KnownField,
-    Provenance,
     certificate_file,
     clipped_field,
-    provenance_by,
+    finder,
 )
 from ..plan.recipe import NORMS, InstanceRecipe
 
@@ -49,21 +46,19 @@ def search_fields(
 ) -> InstanceFields:
     """Find the fields that the sketch of a recipe asks for. sent: certificates that replace proofs."""
     effort = recipe.sketch.points
-    if effort == "none":
-        nearest = _nearest_stroke_field(instance)
-        return nearest, [nearest], []
-    baseline = KnownField(reproducible_field(greedy_field(instance)), provenance_by("greedy"))
+    baseline = KnownField(reproducible_field(greedy_field(instance)), *finder("greedy"))
     if effort == "greedy":
         return baseline, [baseline], []
     if effort == "proven":
         low, proven = _prove_norms(baseline, recipe, sent)
         return baseline, [baseline, *low], proven
-    searched = _search_in_2norm(instance)
+    low_2norm = search(instance, rounds=_ROUNDS, jobs=1).field
+    searched = KnownField(reproducible_field(low_2norm), *finder("search"))
     low, proven = _prove_norms(searched, recipe, sent)
     if instance.orthogonal:
         return baseline, [searched, *low], proven
     fitted = improve_in_1norm(searched.field, recipe.rung)
-    staged = [KnownField(reproducible_field(known.field), provenance_by("two stages")) for known in fitted]
+    staged = [KnownField(reproducible_field(known.field), *finder("two stages")) for known in fitted]
     return baseline, [searched, *low, *fitted, *staged], proven
 
 
@@ -71,12 +66,6 @@ def given_fields(points: InstancePoints, instance: Instance, recipe: InstanceRec
     """Return the given points, without any search; a certificate is checked."""
     low = [points.field(f"least_{norm}") for norm in NORMS]
     return points.field("baseline"), low, points.certificates(instance, recipe.prove)
-
-
-def _nearest_stroke_field(instance: Instance) -> KnownField:
-    """Right-angled crosses along the nearest stroke, or along the first one in a part without strokes."""
-    theta = instance.theta[np.maximum(nearest_strokes(instance), 0)]
-    return KnownField(CrossField.from_lines(instance, theta, theta + HALF), provenance_by("nearest stroke"))
 
 
 def _prove_norms(
@@ -89,24 +78,16 @@ def _prove_norms(
     return [known for known, _ in proofs], certificates
 
 
-def _search_in_2norm(instance: Instance) -> KnownField:
-    """Find a field of low 2-norm energy."""
-    return KnownField(
-        reproducible_field(search(instance, rounds=_ROUNDS, jobs=1).field), provenance_by("search")
-    )
-
-
 def improve_in_1norm(start: CrossField, rung: str) -> list[KnownField]:
     """Find fields of lower 1-norm energy by HiGHS: best angles for the jumps, and on low rungs a search."""
     if start.instance.domain.size > _LP_UP_TO:
         return []
     problem = formulate(start.instance, "milp-mccormick")  # whose objective is the 1-norm energy
-    fitted = _solve_by_highs(with_integers_fixed(problem, start))
+    fitted = _solve_by_highs(problem.with_integers_fixed(start))
     fields = [fitted]
     if rung in _NODES:
         fields.append(_solve_by_highs(problem, mip_max_nodes=_NODES[rung], start=fitted or start))
-    highs = Provenance("HiGHS", version("highspy"))
-    return [KnownField(field, highs) for field in fields if field is not None]
+    return [KnownField(field, "HiGHS", version("highspy")) for field in fields if field is not None]
 
 
 def _solve_by_highs(problem: Problem, start: CrossField | None = None, **options: int) -> CrossField | None:
@@ -142,7 +123,7 @@ def _prove(start: CrossField, file: str, norm: Norm = 2) -> tuple[KnownField, Ch
         path = folder / "a.certificate.npz"
         claim = write_certificate(proof, path)
         data = path.read_bytes()
-    known = KnownField(field, provenance_by(METHOD))
+    known = KnownField(field, *finder(METHOD))
     if claim.status != "optimal" and len(data) > _MOST_BYTES:
         return known, None
-    return known, CheckedCertificate.of(claim, file, data, known.provenance)
+    return known, CheckedCertificate.of(claim, file, data)

@@ -15,7 +15,7 @@ from ....models.storage import read_bytes, write_bytes
 from ....models.written_files import is_unchanged
 from ....templates import ENVIRONMENT
 from ...formats.registry import FORMATS, program_version
-from ...pictures.web import field_picture
+from ...pictures.draw import page_picture
 from ...writing.records import number_text
 from ..documents import check_point
 from ..documents.checksums import SUMS, write_checksums
@@ -31,7 +31,7 @@ from ..documents.documents import (
     load_document,
 )
 from ..ledger.ledger import LEDGER, read_ledger
-from ..plan.recipe import NORMS, InstancePlan, norm_minimised
+from ..plan.recipe import NORMS, InstanceRecipe, norm_minimised
 from ..plan.spec import RUNGS, Spec
 from .table import TABLE, instance_name, table
 
@@ -39,17 +39,10 @@ CHECKER: Final = "check_point.py"
 SOLU: Final = "library.solu"
 TEXTS: Final = ("README.md", "LICENSE", "CITATION.cff", "CHANGELOG.md", "index.html")
 
+CHECKERS: Final = {"certified": check_certificate, "orthogonal": check_orthogonal}
+"""Checkers of certificates, by the fact of a library that needs them."""
 GENERAL: Final = frozenset(
-    {
-        *TEXTS,
-        CHECKER,
-        SOLU,
-        TABLE,
-        INDEX,
-        LEDGER,
-        SUMS,
-        *(f"{name}.py" for name in ("check_certificate", "check_orthogonal")),
-    }
+    {*TEXTS, CHECKER, SOLU, TABLE, INDEX, LEDGER, SUMS, "check_certificate.py", "check_orthogonal.py"}
 )
 """Names of the files about a library as a whole, but for pictures and drawings."""
 
@@ -59,7 +52,7 @@ _OURS: Final = re.compile(r"cf_[a-z0-9_]+(?:\.[A-Za-z0-9]+)+")
 def write_index(
     folder: Path,
     spec: Spec,
-    plans: Sequence[InstancePlan],
+    plans: Sequence[InstanceRecipe],
     skipped: Mapping[str, str],
     *,
     failed: Iterable[str],
@@ -70,19 +63,18 @@ def write_index(
     skipped: names of instances that the specification asks for and that are not in the plans, and why;
     failed: those of them that an error keeps out; earlier: checksums of the build before.
     """
-    sidecars = [
-        load_document(folder / f"{entry.name}.json") for planned in plans for entry in planned.entries
-    ]
+    sidecars = [load_document(folder / f"{entry.name}.json") for recipe in plans for entry in recipe.entries]
     written = general_files(folder, spec, sidecars, skipped)
     for name, data in written.items():
         write_bytes(folder / name, data)
-    abouts = [about_file(planned.recipe.name) for planned in plans]
+    abouts = [about_file(recipe.name) for recipe in plans]
     present = {*written, LEDGER, *read_ledger(folder).files, *abouts}
     present |= {name for file in abouts for name in files_of_instance(load_document(folder / file))}
     for sidecar in sidecars:
         present |= {f"{sidecar['name']}.json", *files_of_entry(sidecar)}
     for name in earlier.keys() - present:  # files that were added by hand stay, and those of what failed
-        if _OURS.fullmatch(name) and is_unchanged(folder / name) and not name.startswith(tuple(failed)):
+        is_ours = (name in GENERAL or _OURS.fullmatch(name)) and is_unchanged(folder / name)
+        if is_ours and not name.startswith(tuple(failed)):
             (folder / name).unlink()
     write_checksums(folder, present)
 
@@ -95,12 +87,17 @@ def general_files(
     context = _template_context(spec, sidecars) | {"skipped": skipped, "pictures": pictures}
     texts = {name: ENVIRONMENT.get_template(f"library/{name}.j2").render(context).encode() for name in TEXTS}
     drawings = {name: data for sketch in spec.sketches for name, data in sketch.files.items()}
-    checkers = {CHECKER: read_bytes(check_point.__file__)}
-    for program, key in ((check_certificate, "certified"), (check_orthogonal, "orthogonal")):
-        if context[key]:
-            path = Path(str(program.__file__))
-            checkers[path.name] = read_bytes(path)
-    index = _index_document(spec, sidecars) | ({"skipped": dict(skipped)} if skipped else {})
+    programs = [check_point, *(program for key, program in CHECKERS.items() if context[key])]
+    paths = [Path(str(program.__file__)) for program in programs]
+    checkers = {path.name: read_bytes(path) for path in paths}
+    index = {
+        "format": INDEX_FORMAT,
+        "version": VERSION,
+        "generator": program_version(),
+        "spec": spec.document(),
+        "entries": [sidecar["name"] for sidecar in sidecars],
+        **({"skipped": dict(skipped)} if skipped else {}),
+    }
     facts = {SOLU: _solu_content(sidecars), TABLE: table(folder, sidecars)}
     return texts | pictures | drawings | checkers | facts | {INDEX: document_bytes(index)}
 
@@ -115,7 +112,7 @@ def _draw_pictures(folder: Path, sidecars: list[dict[str, Any]]) -> Iterator[tup
         about = load_document(folder / about_file(instance_name(largest[family])))
         field = read_field(folder / about["fields"]["least_2"]["file"])
         suffix = "png" if "faces" in about["instance"] else "svg"
-        yield f"cf_{family}.field.{suffix}", field_picture(field)
+        yield f"cf_{family}.field.{suffix}", page_picture(field)
 
 
 def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
@@ -127,6 +124,10 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
         sidecar["source"]["kind"]
         for sidecar in sidecars
         if any("certificate" in bound for bound in sidecar["bounds"])
+    }
+    minimising = {
+        norm: [formulation for formulation in spec.formulations if norm_minimised(formulation) == norm]
+        for norm in NORMS
     }
     return {
         "spec": spec,
@@ -146,18 +147,9 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
         "tightened": sum("tightened" in sidecar for sidecar in sidecars),
         "certified": bool(certified),
         "orthogonal": "mesh" in certified,
-        "proven_by": _formulations_by_norm(spec),
+        "proven_by": [f"norm {norm}, {', '.join(names)}" for norm, names in minimising.items() if names],
         "example": sidecars[0],
     }
-
-
-def _formulations_by_norm(spec: Spec) -> list[str]:
-    """The formulations of a specification by the norm that they minimise."""
-    minimising = {
-        norm: [formulation for formulation in spec.formulations if norm_minimised(formulation) == norm]
-        for norm in NORMS
-    }
-    return [f"norm {norm}, {', '.join(names)}" for norm, names in minimising.items() if names]
 
 
 def _rung_facts(name: str, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
@@ -179,13 +171,3 @@ def _solu_content(sidecars: list[dict[str, Any]]) -> bytes:
         if sidecar["status"] != "optimal" and sidecar["bound"] is not None:
             lines.append(f"=bestdual= {sidecar['name']} {number_text(sidecar['bound'])}\n")
     return "".join(lines).encode()
-
-
-def _index_document(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, Any]:
-    return {
-        "format": INDEX_FORMAT,
-        "version": VERSION,
-        "generator": program_version(),
-        "spec": spec.document(),
-        "entries": [sidecar["name"] for sidecar in sidecars],
-    }

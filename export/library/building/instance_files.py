@@ -2,31 +2,46 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import dataclass
 from typing import Any, Final
 
 from ....models.field.field import CrossField
 from ....models.field.file import field_to_json
 from ....models.instance.file import instance_to_json
 from ....models.instance.instance import Instance
-from ....models.sketch.random_strokes import STROKE_SHARE
+from ....models.sketch.random_strokes import RAGGED_SHARE
 from ...formats.registry import program_version
 from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, document_bytes
 from ..documents.statistics import instance_sizes
-from ..ledger.points import check_certificate, least_energy
+from ..ledger.known_points import InstancePoints
+from ..ledger.ledger import SubmittedCertificate
+from ..ledger.points import ROLES, KnownField, check_certificate, least_energy
 from ..plan.instances import kind_of, make_instance
 from ..plan.recipe import NORMS, InstanceRecipe
 from .fields import given_fields, search_fields
-from .tasks import Files, InstanceTask
 
-SUFFIXES: Final = {
-    "baseline": ".baseline.field.json",
-    "least_mixed": ".mixed.field.json",
-    "least_1": ".l1.field.json",
-    "least_2": ".field.json",
-}
-"""Suffixes of the files of fields by role; equal fields share the last file."""
+Files = dict[str, bytes]  # by name, in the order of writing
 _SIDES: Final = ("height", "width", "vertices", "euler_characteristic")  # of a grid; of a mesh
+
+
+@dataclass(frozen=True, eq=False)
+class InstanceTask:
+    """Everything that the files of an instance depend on, for any process, and its digest.
+
+    given: points that replace a search. fields, certificates: those of the ledger, the latter with the
+    contents of their files.
+    """
+
+    recipe: InstanceRecipe
+    given: InstancePoints | None
+    fields: tuple[KnownField, ...]
+    certificates: tuple[tuple[SubmittedCertificate, bytes], ...]
+    sha256: str
+
+    @property
+    def name(self) -> str:
+        """Name of the instance."""
+        return self.recipe.name
 
 
 def make_instance_files(task: InstanceTask) -> Files:
@@ -37,39 +52,38 @@ def make_instance_files(task: InstanceTask) -> Files:
     instance = make_instance(task.recipe)
     points = task.given if task.given and task.given.instance == instance.sha256 else None
     sent = [
-        check_certificate(proof.data, proof.file, instance, proof.provenance)
-        for proof in task.proofs
-        if proof.instance_sha256 == instance.sha256
+        check_certificate(data, row.file, instance)
+        for row, data in task.certificates
+        if row.instance_sha256 == instance.sha256
     ]
     baseline, low, proven = (
         given_fields(points, instance, task.recipe) if points else search_fields(instance, task.recipe, sent)
     )
-    submitted = [field.known() for field in task.fields]
     every = [
         baseline,
         *low,
-        *(known for known in submitted if known.field.instance.sha256 == instance.sha256),
+        *(known for known in task.fields if known.field.instance.sha256 == instance.sha256),
         *(certificate.known for certificate in sent),  # last: an equal field that was submitted earlier stays
     ]
     # The ledger does not decide on the baseline, whose jumps are the data of `qp-fixed`.
     chosen = {"baseline": baseline} | {f"least_{norm}": least_energy(every, norm) for norm in NORMS}
     files: Files = {f"{task.name}.instance.json": instance_to_json(instance).encode()}
     fields: dict[str, dict[str, Any]] = {}
-    for role in reversed(SUFFIXES):
+    for role in reversed(ROLES):
         known = chosen[role]
         same = next((earlier for earlier in fields if _are_equal(chosen[earlier].field, known.field)), None)
-        name = f"{task.name}{SUFFIXES[same or role]}"
+        name = f"{task.name}{ROLES[same or role]}.field.json"
         if same is None:
             files[name] = field_to_json(known.field)
         energies = {f"energy_{norm}norm": known.field.energy(norm).total for norm in NORMS}
-        fields[role] = {"file": name, **asdict(known.provenance), **energies}
+        fields[role] = {"file": name, **known.origin, **energies}
     certificates = {}
     for norm in NORMS:
         if of_norm := [certificate for certificate in (*sent, *proven) if certificate.norm == norm]:
             best = max(of_norm, key=lambda certificate: certificate.facts["bound"])
             files[best.file] = best.data
             certificates[str(norm)] = {"file": best.file, **best.facts}
-    about = _instance_document(instance, task, {role: fields[role] for role in SUFFIXES})
+    about = _instance_document(instance, task, {role: fields[role] for role in ROLES})
     about |= {"certificates": certificates} if certificates else {}
     return files | {about_file(task.name): document_bytes(about)}
 
@@ -80,18 +94,17 @@ def _are_equal(first: CrossField, second: CrossField) -> bool:
 
 
 def _instance_document(instance: Instance, task: InstanceTask, fields: dict[str, Any]) -> dict[str, Any]:
-    facts = {"given": task.given.sha256} if task.given and task.given.sha256 else {}
-    recipe = task.recipe
-    stated = {"origin": recipe.sketch.origin.document(), "added": recipe.added}
-    return facts | {
+    recipe, given = task.recipe, task.given.sha256 if task.given else None
+    stated = {"origin": recipe.sketch.origin, "added": recipe.sketch.added}
+    return ({"given": given} if given else {}) | {
         "format": ABOUT_FORMAT,
         "version": VERSION,
         "name": task.name,
-        "family": task.recipe.sketch.name,
-        "title": task.recipe.sketch.title,
-        "rung": task.recipe.rung,
+        "family": recipe.sketch.name,
+        "title": recipe.sketch.title,
+        "rung": recipe.rung,
         "generator": program_version(),
-        "source": _source_facts(instance, task.recipe),
+        "source": _source_facts(instance, recipe),
         **{key: value for key, value in stated.items() if value},
         "instance": {
             "file": f"{task.name}.instance.json",
@@ -110,10 +123,9 @@ def _source_facts(instance: Instance, recipe: InstanceRecipe) -> dict[str, Any]:
         "w_beta": instance.skew_coefficient,
     }
     if recipe.sketch.kind == "random":
-        drawn = recipe.sketch.drawn
-        share = drawn.get("share", STROKE_SHARE)
-        parameters |= {"generator": "NumPy PCG64", "mask": recipe.sketch.what, "stroke_share": share}
-        parameters |= {"ragged_share": drawn["mask_share"]} if recipe.sketch.what == "ragged" else {}
+        sketch = recipe.sketch
+        parameters |= {"generator": "NumPy PCG64", "mask": sketch.what, "stroke_share": sketch.share}
+        parameters |= {"ragged_share": RAGGED_SHARE} if sketch.what == "ragged" else {}
     sizes = instance.domain.facts
     return {
         "sketch": recipe.sketch.what,

@@ -6,7 +6,7 @@ Fields ship with their instances. A build makes the same instances from drawings
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, cached_property
 from pathlib import Path
@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from ..ledger.known_points import InstancePoints
     from ..ledger.ledger import Ledger
     from ..ledger.points import KnownField
-    from ..plan.recipe import EntryRecipe, InstancePlan
-    from ..plan.spec import Spec
 
 SHIPPED: Final = Path(__file__).parents[1] / "plan" / TABLE
 POINTS: Final = SHIPPED.parent / "known" / "points"  # as in the specification
@@ -98,8 +96,7 @@ class LibraryEntry:
     @cached_property
     def field(self) -> CrossField:
         """The field of the best known point. Raises InputError, InstanceError for damaged points."""
-        from ..ledger.known_points import ROLES
-        from ..ledger.points import best_point
+        from ..ledger.points import ROLES, best_point
 
         known = [*(self._points.field(role) for role in ROLES), *self._submitted()]
         certified = self.certificate.field if self.facts["tightened"] and self.certificate else None
@@ -112,8 +109,10 @@ class LibraryEntry:
         Raises InputError for a certificate that is refused.
         """
         from ....models.proof.certificate import read_certificate
+        from ..plan.recipe import norm_minimised
 
-        stated = self._points.about.get("certificates", {}).get(str(self._recipe.norm))
+        norm = norm_minimised(self.facts["formulation"], self.facts["facet"])
+        stated = self._points.about.get("certificates", {}).get(str(norm))
         if stated is None:
             return None
         return read_certificate(POINTS / stated["file"], on=self.instance)
@@ -129,7 +128,7 @@ class LibraryEntry:
         Returns
         -------
         Written
-            Format, dialect, the problem as the file holds it, and size and SHA-256 by file name.
+            Format, the problem as the file holds it, and size and SHA-256 by file name.
 
         Raises
         ------
@@ -152,16 +151,14 @@ class LibraryEntry:
         OutputError.
         """
         from ...bundle.manifest import write_manifest
+        from ..plan.spec import default_spec
         from .entry_files import write_models
 
-        written, refused = write_models(self.problem, self._recipe, folder)
+        (rung,) = (rung for rung in default_spec().rungs if rung.name == self.facts["rung"])
+        written, refused = write_models(self.problem, self.name, rung.formats, folder, compress=rung.compress)
         manifest = write_manifest(self.problem, written, refused, folder, self.name)
         models = [name for model in written for name in model.files]
         return [*models, manifest.path.name, manifest.document["instance"]["file"]]
-
-    @property
-    def _recipe(self) -> EntryRecipe:
-        return _plan_of(self.name)[1]
 
     @cached_property
     def _points(self) -> InstancePoints:
@@ -176,22 +173,23 @@ class LibraryEntry:
 
     def _submitted(self) -> Iterable[KnownField]:
         """The fields of the ledger for the entries of the instance."""
-        from ..ledger.points import KnownField, provenance_by
+        from ..ledger.points import KnownField
 
-        ledger = _ledger()
-        for recipe in _plan_of(self.name)[0].entries:
-            record = ledger.record_with_field(recipe.name)
-            if record is not None:
-                field = ledger.read_field(record)
+        for row in _rows().values():
+            record = _ledger().record_with_field(row["name"])
+            if record is not None and row["instance"] == self.facts["instance"]:
+                field = _ledger().read_field(record)
                 if field.instance.sha256 == self.instance.sha256:
-                    yield KnownField(field, provenance_by("ledger"))
+                    yield KnownField.of(field, vars(record))
 
 
-def entries(*, rung: str | None = None) -> list[LibraryEntry]:
+def entries(*names: str, rung: str | None = None) -> list[LibraryEntry]:
     """Entries of the library that ships, with their facts, in its order.
 
     Parameters
     ----------
+    names
+        Names of entries, such as `cf_mouse_n032_exact`; without any, all entries.
     rung
         Only entries of this class: `tiny`, `small`, `medium`, `large` or `mesh`.
 
@@ -203,40 +201,24 @@ def entries(*, rung: str | None = None) -> list[LibraryEntry]:
     Raises
     ------
     InputError
-        For an unknown rung.
+        For an unknown name, with similar ones, and for an unknown rung.
 
     """
+    for name in names:
+        if name not in _rows():
+            near = get_close_matches(name, _rows(), 3)
+            asked = f"is it {' or '.join(near)}?" if near else "crossfield.entries() lists them"
+            raise InputError(f"the library that ships has no entry {shortened(name)!r}; {asked}")
     if rung is not None:
         from ..plan.spec import RUNGS
 
         check_choice("rung", rung, RUNGS)
-    return [LibraryEntry(row) for row in _rows().values() if rung in (None, row["rung"])]
-
-
-def entry(name: str) -> LibraryEntry:
-    """Entry of the library that ships, by its name.
-
-    Parameters
-    ----------
-    name
-        Name of the entry, such as `cf_mouse_n032_exact`.
-
-    Returns
-    -------
-    LibraryEntry
-        The entry, with `instance`, `problem`, `field`, `bound`, `status`, `certificate` and `write`.
-
-    Raises
-    ------
-    InputError
-        For an unknown name, with similar ones.
-
-    """
-    if name not in _rows():
-        near = get_close_matches(name, _rows(), 3)
-        asked = f"is it {' or '.join(near)}?" if near else "crossfield.entries() lists them"
-        raise InputError(f"the library that ships has no entry {shortened(name)!r}; {asked}")
-    return LibraryEntry(_rows()[name])
+    rows = _rows().values()
+    return [
+        LibraryEntry(row)
+        for row in rows
+        if rung in (None, row["rung"]) and (not names or row["name"] in names)
+    ]
 
 
 def write_entries(
@@ -267,34 +249,7 @@ def _rows() -> dict[str, dict[str, Any]]:
 
 
 @cache
-def _spec() -> Spec:
-    from ..plan.spec import default_spec
-
-    return default_spec()
-
-
-@cache
-def _plans(sketch: str) -> dict[str, tuple[InstancePlan, EntryRecipe]]:
-    """The plans of all entries of a sketch by name; those of all sketches take ten times as long."""
-    from ..plan.recipe import plan_library
-
-    spec = _spec()
-    alone = replace(spec, sketches=tuple(each for each in spec.sketches if each.name == sketch))
-    return {recipe.name: (planned, recipe) for planned in plan_library(alone) for recipe in planned.entries}
-
-
-def _plan_of(name: str) -> tuple[InstancePlan, EntryRecipe]:
-    """The plan of an entry. Raises InputError where the table has entries that the specification lacks."""
-    for sketch in _spec().sketches:
-        if name.startswith(f"cf_{sketch.name}_") and (plan := _plans(sketch.name).get(name)):
-            return plan
-    raise InputError(f"{name} is not in the specification; build the library again", file=SHIPPED)
-
-
-@cache
 def _ledger() -> Ledger:
     from ..ledger.ledger import read_ledger
 
-    path = _spec().ledger
-    assert path is not None  # the specification that ships has a ledger
-    return read_ledger(path.parent, path.name)
+    return read_ledger(POINTS.parent)

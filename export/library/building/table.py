@@ -5,29 +5,23 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from ....models.storage import read_bytes
 
 TABLE: Final = "entries.csv"
-OPEN: Final = "open"  # the status `best known` of a sidecar, in one word
 
 
-@dataclass(frozen=True)
-class TableColumn:
-    """A column: the type of its values, and its value from a sidecar. None: unknown."""
-
-    kind: type[str | int | float | bool]
-    value: Callable[[dict[str, Any]], Any]
+Value = Callable[[dict[str, Any]], Any]
+"""Returns the value of a column from a sidecar; None: unknown."""
 
 
-def _counts(*keys: str) -> Callable[[dict[str, Any]], int]:
+def _counts(*keys: str) -> Value:
     return lambda sidecar: sum(sidecar["counts"][key] for key in keys)
 
 
-def _fact(*keys: str) -> Callable[[dict[str, Any]], Any]:
+def _fact(*keys: str) -> Value:
     def value(sidecar: dict[str, Any]) -> Any:
         value: Any = sidecar
         for key in keys:
@@ -60,61 +54,54 @@ def role_of(sidecar: dict[str, Any]) -> str:
     return f"least_{norm_minimised(sidecar['formulation']) or 2}"
 
 
-def _status(sidecar: dict[str, Any]) -> str:
-    return OPEN if sidecar["status"] == "best known" else str(sidecar["status"])
-
-
 def _optimum(sidecar: dict[str, Any]) -> float | None:
     return float(sidecar["best"]["objective"]) if sidecar["status"] == "optimal" else None
 
 
-COLUMNS: Final[Mapping[str, TableColumn]] = {
-    "name": TableColumn(str, _fact("name")),
-    "instance": TableColumn(str, instance_name),
-    "family": TableColumn(str, _fact("family")),
-    "rung": TableColumn(str, _fact("rung")),
-    "gauge": TableColumn(str, _fact("source", "gauge")),
-    "formulation": TableColumn(str, _fact("formulation")),
-    "facet": TableColumn(str, _fact("options", "facet")),
-    "tightened": TableColumn(bool, lambda sidecar: "tightened" in sidecar),
-    "problem_class": TableColumn(str, _fact("class")),
-    "probtype": TableColumn(str, _fact("probtype")),
-    "convex": TableColumn(bool, _fact("convex")),
-    "seed": TableColumn(int, _fact("source", "seed")),
-    "size": TableColumn(int, _fact("source", "size")),
-    "pixels": TableColumn(int, _fact("instance", "pixels")),
-    "faces": TableColumn(int, _fact("instance", "faces")),
-    "strokes": TableColumn(int, _fact("instance", "strokes")),
-    "pairs": TableColumn(int, _fact("instance", "pairs")),
-    "density": TableColumn(float, _fact("density")),
-    "columns": TableColumn(int, _counts("variables")),
-    "rows": TableColumn(int, _counts("constraints")),
-    "integers": TableColumn(int, _counts("binary", "integer")),
-    "binaries": TableColumn(int, _counts("binary")),
-    "equalities": TableColumn(int, _counts("equalities")),
-    "nonzeros": TableColumn(int, _counts("nonzeros")),
-    "nonlinear_nonzeros": TableColumn(int, _counts("nonlinear_nonzeros")),
-    "quadratic_rows": TableColumn(int, _counts("quadratic_constraints")),
-    "nonlinear_rows": TableColumn(int, _counts("polynomial_constraints", "general_constraints")),
-    "linear_terms": TableColumn(int, _counts("objective_linear_terms")),
-    "quadratic_terms": TableColumn(int, _counts("objective_quadratic_terms")),
-    "nonlinear_terms": TableColumn(
-        int,
-        _counts("objective_higher_terms", "objective_general_terms"),
-    ),
-    "vortices": TableColumn(int, _fact("vortices")),
-    "objective": TableColumn(float, _fact("best", "objective")),
-    "optimum": TableColumn(float, _optimum),
-    "bound": TableColumn(float, _fact("bound")),
-    "gap": TableColumn(float, _fact("gap")),
-    "status": TableColumn(str, _status),
-    "solved": TableColumn(str, _fact("solved", "by")),
-    "difficulty": TableColumn(str, _fact("difficulty")),
-    "proof_seconds": TableColumn(float, _proof_seconds),
-    "jumps_file": TableColumn(str, _fact("jumps_file")),
-    "licence": TableColumn(str, _fact("licence")),
+COLUMNS: Final[Mapping[str, tuple[type[str | int | float | bool], Value]]] = {
+    "name": (str, _fact("name")),
+    "instance": (str, instance_name),
+    "family": (str, _fact("family")),
+    "rung": (str, _fact("rung")),
+    "gauge": (str, _fact("source", "gauge")),
+    "formulation": (str, _fact("formulation")),
+    "facet": (str, _fact("options", "facet")),
+    "tightened": (bool, lambda sidecar: "tightened" in sidecar),
+    "problem_class": (str, _fact("class")),
+    "probtype": (str, _fact("probtype")),
+    "convex": (bool, _fact("convex")),
+    "seed": (int, _fact("source", "seed")),
+    "size": (int, _fact("source", "size")),
+    "pixels": (int, _fact("instance", "pixels")),
+    "faces": (int, _fact("instance", "faces")),
+    "strokes": (int, _fact("instance", "strokes")),
+    "pairs": (int, _fact("instance", "pairs")),
+    "density": (float, _fact("density")),
+    "columns": (int, _counts("variables")),
+    "rows": (int, _counts("constraints")),
+    "integers": (int, _counts("binary", "integer")),
+    "binaries": (int, _counts("binary")),
+    "equalities": (int, _counts("equalities")),
+    "nonzeros": (int, _counts("nonzeros")),
+    "nonlinear_nonzeros": (int, _counts("nonlinear_nonzeros")),
+    "quadratic_rows": (int, _counts("quadratic_constraints")),
+    "nonlinear_rows": (int, _counts("polynomial_constraints", "general_constraints")),
+    "linear_terms": (int, _counts("objective_linear_terms")),
+    "quadratic_terms": (int, _counts("objective_quadratic_terms")),
+    "nonlinear_terms": (int, _counts("objective_higher_terms", "objective_general_terms")),
+    "vortices": (int, _fact("vortices")),
+    "objective": (float, _fact("best", "objective")),
+    "optimum": (float, _optimum),
+    "bound": (float, _fact("bound")),
+    "gap": (float, _fact("gap")),
+    "status": (str, lambda sidecar: sidecar["status"].replace("best known", "open")),  # in one word
+    "solved": (str, _fact("solved", "by")),
+    "difficulty": (str, _fact("difficulty")),
+    "proof_seconds": (float, _proof_seconds),
+    "jumps_file": (str, _fact("jumps_file")),
+    "licence": (str, _fact("licence")),
 }
-"""The columns in order; docs/library/columns.csv states their meanings."""
+"""Types and values of the columns in order; docs/library/columns.csv states their meanings."""
 
 
 def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:
@@ -135,20 +122,15 @@ def table(folder: Path, sidecars: Sequence[dict[str, Any]]) -> bytes:
         if file not in vortices:
             vortices[file] = len(read_field(folder / file).singularities.index)
         known = sidecar | {"vortices": vortices[file], "jumps_file": file}
-        writer.writerow([_format_value(column.value(known)) for column in COLUMNS.values()])
+        writer.writerow([_format_value(value(known)) for _, value in COLUMNS.values()])
     return text.getvalue().encode()
 
 
 def read_table(path: Path) -> list[dict[str, Any]]:
     """Return the rows of a table by column, None for unknown values. Raises InputError without the file."""
-    return parse_table(read_bytes(path))
-
-
-def parse_table(data: bytes) -> list[dict[str, Any]]:
-    """Return the rows of the content of a table, as `read_table` does."""
-    names, *rows = csv.reader(io.StringIO(data.decode()))
+    names, *rows = csv.reader(io.StringIO(read_bytes(path).decode()))
     texts = dict(zip(names, zip(*rows, strict=True), strict=True))
-    values = [[_parse_value(text, column.kind) for text in texts[key]] for key, column in COLUMNS.items()]
+    values = [[_parse_value(text, kind) for text in texts[key]] for key, (kind, _) in COLUMNS.items()]
     return [dict(zip(COLUMNS, row, strict=True)) for row in zip(*values, strict=True)]
 
 

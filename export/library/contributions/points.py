@@ -18,8 +18,8 @@ from ....models.instance.instance import Instance
 from ....models.processes.deadline import Progress, silent
 from ....models.proof.certificate import read_certificate
 from ....models.storage import read_bytes
+from ...solutions.read import read_solution
 from ...solutions.readers.registry import head_of, recognising_readers
-from ...solutions.solution import read_solution
 from ..documents.documents import Library, about_file, existing_folder, problem_of, read_about
 from ..documents.lock import library_lock
 from ..ledger.grades import ACCEPTED_VIOLATION, is_better
@@ -49,7 +49,7 @@ def add_points(
                     improved[path] = names
             except CrossfieldError as error:
                 refused[path] = str(error)
-        write_ledger(check.ledger)
+        write_ledger(library.folder, check.ledger)
     return improved, refused
 
 

@@ -23,12 +23,13 @@ from ....models.formulations.problem import Problem
 from ....models.processes.deadline import Progress, silent
 from ....models.processes.limits import Limits
 from ....models.storage import temporary_folder
-from ...solutions.solution import Solution, read_solution
+from ...solutions.read import read_solution
+from ...solutions.solution import Solution
 from ...solvers_table import SOLVERS
 from ...solving.local import Solvers, choose_format
 from ...statuses import Status
-from ..building.build import has_unbuilt_records, rebuild
-from ..documents.checksums import claim_targets
+from ..building.build import rebuild
+from ..documents.checksums import claim_targets, is_intact, read_checksums
 from ..documents.documents import Library, problem_of, read_library
 from ..documents.lock import library_lock
 from ..ledger.grades import is_better
@@ -67,12 +68,11 @@ def solve_library(
     Record("cf_none", "0" * 64, "none", "0", "no point", by=by, machine=machine).check()
     library, records = read_library(folder), []
     read_ledger(library.folder)  # a damaged one is reported as such
+    sums = read_checksums(library.folder)
     claim_targets(library.folder, (), (LEDGER,))
-    if has_unbuilt_records(library):
-        library = rebuild(library.folder, progress=progress)
     try:
         with Solvers() as at_work:
-            work = _SolveSession(library, at_work, time_limit)
+            work = _SolveSession(library, at_work, time_limit, {"by": by, "machine": machine})
             runs = list(work.runs(list(chosen), rungs))
             for number, (document, solver) in enumerate(runs, 1):
                 progress(f"{number} of {len(runs)} runs: {solver} on {document['name']}")
@@ -81,22 +81,22 @@ def solve_library(
                 except UnsupportedBySolverError as error:
                     progress(f"{document['name']}: {error}")
                     continue
-                record = replace(record, by=by, machine=machine)
                 with library_lock(library.folder, _PURPOSE, progress):
                     records.append(asdict(add_record(library.folder, record, field)))
     finally:  # records count although Ctrl-C or an error ended the runs
-        if has_unbuilt_records(library):
+        if not is_intact(library.folder, LEDGER, sums):
             rebuild(library.folder, progress=progress)
     return records
 
 
 @dataclass
 class _SolveSession:
-    """Runs on a library with a time limit each."""
+    """Runs on a library with a time limit each. stated: who runs them, and on which machine."""
 
     library: Library
     solvers: Solvers
     limit: float
+    stated: dict[str, Any]
 
     def runs(self, solvers: list[str], rungs: Sequence[str]) -> Iterator[tuple[dict[str, Any], str]]:
         """Yield sidecar and solver of each missing run that the solver supports."""
@@ -105,7 +105,8 @@ class _SolveSession:
             if document["rung"] not in rungs:
                 continue
             problem = problem_of(self.library, document)
-            have = ledger.records_of(document["name"], problem.sha256)
+            key = (document["name"], problem.sha256)
+            have = [record for record in ledger.records if (record.entry, record.problem_sha256) == key]
             for solver in solvers:
                 takes = choose_format(problem, solver).answer == "yes"
                 if takes and not any(self._is_covered_by(record, solver) for record in have):
@@ -132,6 +133,7 @@ class _SolveSession:
             "no point",
             threads=1,
             time_limit=self.limit,
+            **self.stated,
         )
         try:
             solution = self._solve(document, problem, solver)
@@ -144,11 +146,8 @@ class _SolveSession:
         proves, bound = _has_proof(problem, solver, solution), solution.bound
         if bound is None and solution.objective is not None and proves:
             bound = solution.objective - GAP * abs(solution.objective)
-        record = replace(
-            record,
-            bound=bound,
-            seconds=None if solution.seconds is None else round(solution.seconds, 3),
-        )
+        seconds = None if solution.seconds is None else round(solution.seconds, 3)
+        record = replace(record, bound=bound, seconds=seconds)
         if solution.point is None:
             return record, None
         field = clipped_field(solution.problem, solution.point)
@@ -172,9 +171,9 @@ class _SolveSession:
 
 def _has_proof(problem: Problem, solver: str, solution: Solution) -> bool:
     """Whether the solver ended with a proof of a global optimum."""
-    if solution.problem.formulation.is_weakened or not (
-        problem.is_convex or SOLVERS[solver].proves == "global"
-    ):
+    proves, optima = SOLVERS[solver].proves, {Status.OPTIMAL_GLOBAL}
+    if problem.is_convex:
+        optima.add(Status.OPTIMAL_LOCAL)
+    elif proves != "global":
         return False
-    local = problem.is_convex and solution.status == Status.OPTIMAL_LOCAL
-    return SOLVERS[solver].proves != "local" and (solution.status == Status.OPTIMAL_GLOBAL or local)
+    return proves != "local" and not solution.problem.formulation.is_weakened and solution.status in optima

@@ -19,12 +19,12 @@ import gzip
 import re
 import sys
 import zlib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from functools import lru_cache
 from math import prod
-from typing import Any, NamedTuple, NoReturn
+from typing import NamedTuple
 
 ZERO = Decimal(0)
 EXACT = decimal.Context(prec=20_000, traps=[decimal.Inexact, decimal.InvalidOperation, decimal.Overflow])
@@ -33,6 +33,7 @@ INFINITE, CLAIM = Decimal("1e20"), Decimal("1e-5")  # bounds from here on are no
 LONGEST_LINE, MOST_BYTES = 1 << 20, 1 << 30  # a small .gz that holds more is a trap
 LONGEST_NUMBER, GREATEST_EXPONENT = 100, 400
 DECIMAL = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?", re.ASCII)
+SECTIONS = ("NAME", "ROWS", "COLUMNS", "RHS", "BOUNDS", "QUADOBJ", "QCMATRIX", "ENDATA")
 BOUNDS = {"LO": ["lower"], "UP": ["upper"], "FX": ["lower", "upper"],
           "FR": ["lower", "upper"], "MI": ["lower"], "PL": ["upper"]}  # fmt: skip
 """Kinds of bounds, and the ends that they set."""
@@ -47,7 +48,6 @@ class BadInputError(Exception):
 class Column:
     """A column: whether it is integer, and its bounds by end, None where there is none."""
 
-    name: str
     integer: bool
     bounds: dict[str, Decimal | None] = field(default_factory=dict)
 
@@ -58,11 +58,11 @@ class Row:
 
     sense: str
     side: Decimal = ZERO
-    terms: list[tuple[tuple[int, ...], Decimal]] = field(default_factory=list)
+    terms: list[tuple[tuple[str, ...], Decimal]] = field(default_factory=list)
 
-    def value(self, point: Sequence[Decimal]) -> Decimal:
+    def value(self, point: Mapping[str, Decimal]) -> Decimal:
         """The exact value of its left side at a point."""
-        return sum((prod((point[at] for at in term), start=factor) for term, factor in self.terms), ZERO)
+        return sum((prod((point[name] for name in term), start=factor) for term, factor in self.terms), ZERO)
 
 
 class PointReport(NamedTuple):
@@ -106,105 +106,66 @@ def lines_of(path: str) -> Iterator[tuple[int, str]]:
 
 
 class Model:
-    """A model, read section by section from the free MPS of a library."""
+    """A model: columns and rows by name, and the name of the objective."""
 
-    def __init__(self, lines: Iterable[tuple[int, str]]) -> None:
-        self.columns: list[Column] = []
-        self.place: dict[str, int] = {}
+    def __init__(self, path: str) -> None:
+        """Read it from the free MPS of a library."""
+        self.columns: dict[str, Column] = {}
         self.rows: dict[str, Row] = {}
-        self.goal, self.integer = "", False
-        self.sides: set[str] = set()
-        self.matrices: dict[tuple[str, str], dict[tuple[int, int], Decimal]] = {}
-        readers = {"ROWS": self._row, "COLUMNS": self._entries, "RHS": self._side, "BOUNDS": self._bound}
-        readers |= {"QUADOBJ": self._product, "QCMATRIX": self._product}
-        section = ""
-        for at, line in lines:
+        self.goal, self._integer = "", False
+        section = [""]
+        for at, line in lines_of(path):
             words = line.split()
-            if not words or line.startswith("*") or section == "ENDATA":
+            if not words or line.startswith("*"):
                 continue
-            try:
-                if line[0].isspace():
-                    _require(section in readers, "stands outside of every section")
-                    readers[section](words)
-                    continue
-                section = words[0]
-                _require(section in (*readers, "NAME", "ENDATA"), f"no section {section[:20]!r} is known")
-                self.matrix = self.matrices.setdefault((section, words[-1]), {})
-            except BadInputError as error:
-                raise BadInputError(f"line {at}: {error}") from None
-        _require(section == "ENDATA", "holds no ENDATA; it is cut off, or no MPS file")
+            if line[0].isspace():
+                try:
+                    self._read(section, words)
+                except (BadInputError, KeyError, ValueError, IndexError) as error:
+                    raise BadInputError(f"line {at} does not fit {section[0][:20]}: {error}") from None
+            else:
+                section = words
+                _require(section[0] in SECTIONS, f"line {at}: no section {section[0][:20]!r} is known")
+        _require(section[0] == "ENDATA", "holds no ENDATA; it is cut off, or no MPS file")
         _require(self.goal, "holds no objective")
-        for (kind, name), matrix in self.matrices.items():
-            triangle = kind == "QUADOBJ"  # of twice the matrix; QCMATRIX holds the whole matrix
-            for (i, j), value in matrix.items():
-                fits = i == j or ((j, i) not in matrix if triangle else matrix.get((j, i)) == value)
-                _require(fits, f"{kind} must hold one triangle, QCMATRIX equal ones")
-                factor = value / 2 if triangle and i == j else value
-                _entry(self.rows, self.goal if triangle else name, "row").terms.append(((i, j), factor))
-        for column in self.columns:  # solvers differ on bounds that are left out
-            _require(len(column.bounds) == 2, f"{column.name[:40]} lacks a bound")
+        for name, column in self.columns.items():  # solvers differ on bounds that are left out
+            _require(len(column.bounds) == 2, f"{name[:40]} lacks a bound")
 
-    def _row(self, words: list[str]) -> None:
-        _require(len(words) == 2 and words[0] in ("N", "L", "G", "E"), "a row needs a sense and a name")
-        sense, name = words
-        _require(name not in self.rows, f"the row {name[:40]} is there twice")
-        self.rows[name] = Row(sense)
-        if sense == "N":
-            _require(not self.goal, "a model has one objective")
-            self.goal = name
-
-    def _entries(self, words: list[str]) -> None:
-        if len(words) == 3 and words[1] == "'MARKER'":
-            _require(words[2] in ("'INTORG'", "'INTEND'"), f"the marker {words[2][:20]} is not known")
-            self.integer = words[2] == "'INTORG'"
-            return
-        name = words[0]
-        if not self.columns or name != self.columns[-1].name:
-            _require(name not in self.place, f"the entries of column {name[:40]} do not follow each other")
-            self.place[name] = len(self.columns)
-            self.columns.append(Column(name, self.integer))
-        term = (len(self.columns) - 1,)
-        for row, value in _pairs(words[1:]):
-            terms = _entry(self.rows, row, "row").terms
-            _require(not terms or terms[-1][0] != term, f"{name[:40]} has two entries in {row[:40]}")
-            terms.append((term, number(value)))
-
-    def _side(self, words: list[str]) -> None:
-        for name, value in _pairs(words[len(words) % 2 :]):  # a name of the set may come first
-            _require(name not in self.sides, f"{name[:40]} is there twice")
-            self.sides.add(name)
-            _entry(self.rows, name, "row").side = number(value)
-
-    def _bound(self, words: list[str]) -> None:
-        kind = words[0]
-        _require(kind in BOUNDS, f"the kind of bound {kind[:20]} is not known here")
-        _require(len(words) == 3 + (kind not in FREE), "a bound has a kind, a set, a column, mostly a value")
-        value = None if kind in FREE else number(words[3])
-        if value is not None and abs(value) >= INFINITE:
-            _require(kind == ("UP" if value > 0 else "LO"), f"the bound {words[3][:20]} leaves no value")
-            value = None
-        bounds = self.columns[_entry(self.place, words[2], "column")].bounds
-        for end in BOUNDS[kind]:
-            _require(end not in bounds, f"{words[2][:40]} has two {end} bounds")
-            bounds[end] = value
-
-    def _product(self, words: list[str]) -> None:
-        _require(len(words) == 3, "an entry of a matrix needs two columns and a value")
-        first, second = (_entry(self.place, name, "column") for name in words[:2])
-        _require((first, second) not in self.matrix, f"the entry of {words[0][:40]} is there twice")
-        self.matrix[first, second] = number(words[2])
-
-
-def _entry(table: dict[str, Any], name: str, kind: str) -> Any:
-    """The entry of that name in a table."""
-    _require(name in table, f"there is no {kind} {name[:40]}")
-    return table[name]
+    def _read(self, section: list[str], words: list[str]) -> None:
+        """Read a line. Raises KeyError for an unknown name or word, ValueError for too many or few words."""
+        if section[0] == "ROWS":
+            sense, name = words
+            self.rows[name] = Row({kind: kind for kind in "NLGE"}[sense])
+            self.goal = name if sense == "N" else self.goal
+        elif section[0] == "COLUMNS" and words[1] == "'MARKER'":
+            self._integer = {"'INTORG'": True, "'INTEND'": False}[words[2]]
+        elif section[0] == "COLUMNS":
+            self.columns.setdefault(words[0], Column(self._integer))
+            for row, value in _pairs(words[1:]):
+                self.rows[row].terms.append(((words[0],), number(value)))
+        elif section[0] == "RHS":
+            for row, value in _pairs(words[len(words) % 2 :]):  # a name of the set may come first
+                self.rows[row].side = number(value)
+        elif section[0] == "BOUNDS":
+            kind, _, name, *values = words
+            bound = None if kind in FREE else number(values[0])
+            if bound is not None and abs(bound) >= INFINITE:
+                _require(kind == ("UP" if bound > 0 else "LO"), "leaves no value")
+                bound = None
+            self.columns[name].bounds.update(dict.fromkeys(BOUNDS[kind], bound))
+        else:  # QUADOBJ holds a triangle of twice the matrix of the objective; QCMATRIX all of a row's
+            first, second, text = words
+            _require({first, second} <= self.columns.keys(), "a column is not known")
+            halved = section[0] == "QUADOBJ" and first == second
+            matrix = self.rows[{"QUADOBJ": self.goal, "QCMATRIX": section[-1]}[section[0]]]
+            matrix.terms.append(((first, second), number(text) / 2 if halved else number(text)))
 
 
 def _pairs(words: list[str]) -> Iterator[tuple[str, str]]:
-    """Names and values in turn."""
-    _require(words and len(words) % 2 == 0, "a name or a number is missing")
-    return zip(words[::2], words[1::2])
+    """Names and values in turn. Raises ValueError if one is missing."""
+    for at in range(0, len(words), 2):
+        name, value = words[at : at + 2]
+        yield name, value
 
 
 def read_point(path: str) -> dict[str, Decimal]:
@@ -223,19 +184,18 @@ def read_point(path: str) -> dict[str, Decimal]:
 
 def check_values(model: Model, values: dict[str, Decimal]) -> PointReport:
     """Check values by name against a model without rounding errors."""
-    foreign = [name for name in values if name not in model.place and name != "=obj="]
+    foreign = [name for name in values if name not in model.columns and name != "=obj="]
     of = f"{len(foreign)} of {len(values)} names are not in the model, {''.join(foreign[:1])[:40]!r} is one"
     _require(not foreign, f"{of}; it is of another instance or formulation")
-    point: list[Decimal] = []
+    point: dict[str, Decimal] = {}
     excess: dict[str, list[tuple[Decimal, str]]] = {"bounds": [], "rows": [], "integers": []}
-    for column in model.columns:
+    for name, column in model.columns.items():
         lower, upper = column.bounds["lower"], column.bounds["upper"]
         fixed = lower if lower is not None and lower == upper else ZERO
-        value = values.get(column.name, fixed)
-        point.append(value)
-        excess["bounds"].append((_outside(value, lower, upper), column.name))
+        value = point[name] = values.get(name, fixed)
+        excess["bounds"].append((_outside(value, lower, upper), name))
         if column.integer:
-            excess["integers"].append((abs(value - value.to_integral_value()), column.name))
+            excess["integers"].append((abs(value - value.to_integral_value()), name))
     for name, row in model.rows.items():
         lower, upper = (None if row.sense in without else row.side for without in ("LN", "GN"))
         excess["rows"].append((_outside(row.value(point), lower, upper), name))
@@ -258,26 +218,21 @@ def check(model: str, point: str) -> PointReport:
         with decimal.localcontext(EXACT):
             values = read_point(path)
             path = model
-            return check_values(Model(lines_of(path)), values)
+            return check_values(Model(path), values)
     except BadInputError as error:
         raise BadInputError(f"{path}: {error}") from None
 
 
-class _Parser(argparse.ArgumentParser):
-    """Reports a wrong argument in one line."""
-
-    def error(self, message: str) -> NoReturn:
-        raise BadInputError(f"{message}; see check_point.py --help")
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Check a point and print a report; the exit code."""
-    parser = _Parser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("model", metavar="MODEL")
     parser.add_argument("point", metavar="POINT")
     parser.add_argument("--tolerance", default="1e-8", help="greatest violation of a feasible point (1e-8)")
+    options = parser.parse_args(arguments)
     try:
-        options = parser.parse_args(arguments)
         tolerance = number(options.tolerance)
         _require(tolerance >= 0, "the tolerance must not be negative")
         report = check(options.model, options.point)

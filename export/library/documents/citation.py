@@ -32,7 +32,7 @@ REFERENCES: Final = (
 
 def release_facts(spec: Spec) -> dict[str, Any]:
     """Return what is cited: title, authors, and stated version and date."""
-    return {"title": spec.title, **({"authors": []} if spec.release is None else spec.release.document())}
+    return {"title": spec.title, "authors": []} | (spec.release or {})
 
 
 def licence_terms(sketches: Sequence[Sketch]) -> dict[str, Any]:
@@ -41,17 +41,13 @@ def licence_terms(sketches: Sequence[Sketch]) -> dict[str, Any]:
     licence: the known licence of all sketches, or empty; known: identifiers of all known licences; lines:
     one per sketch with its origin.
     """
-    stated = list(dict.fromkeys(sketch.origin.license for sketch in sketches))
+    stated = list(dict.fromkeys(sketch.origin.get("license", "") for sketch in sketches))
     known = [licence for licence in stated if licence in LICENCES]
     licence = known[0] if len(stated) == len(known) == 1 else ""
     return {"licence": licence, "known": known, "lines": list(map(_line, sketches))}
 
 
 def _line(sketch: Sketch) -> str:
-    origin = sketch.origin
-    parts = (
-        origin.license or "no licence is stated; ask its author before you share it",
-        origin.author and f"author: {origin.author}",
-        origin.source and f"source: {origin.source}",
-    )
-    return f"{sketch.name}: {'; '.join(filter(None, parts))}"
+    licence = sketch.origin.get("license", "no licence is stated; ask its author before you share it")
+    others = [f"{key}: {sketch.origin[key]}" for key in ("author", "source") if key in sketch.origin]
+    return f"{sketch.name}: {'; '.join([licence, *others])}"

@@ -6,8 +6,8 @@ Their schemas are the files library-*.schema.json in this folder.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Any, Final
 
 from ....models.documents import read_document
 from ....models.errors import CrossfieldError, InputError
-from ....models.formulations.problem import Problem, with_windows
+from ....models.formulations.problem import Problem
 from ....models.formulations.windows import Windows
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import read_certificate
@@ -35,12 +35,13 @@ INDEX: Final = "library.json"
 class Library:
     """A built library: its folder and its checked index.
 
-    failed: the errors of instances and entries that its build could not make, by name.
+    failed: the errors of instances and entries that its build could not make, by name. notices: of the build.
     """
 
     folder: Path
     document: dict[str, Any]
     failed: Mapping[str, CrossfieldError] = field(default_factory=dict)
+    notices: Sequence[str] = ()
 
     @cached_property
     def entries(self) -> tuple[dict[str, Any], ...]:
@@ -132,7 +133,7 @@ def problem_of(library: Library | str | Path, document: dict[str, Any]) -> Probl
 
 def tightened_by(certificate: Claim, problem: Problem) -> Problem:
     """Return a problem in the windows that a certificate leaves."""
-    return with_windows(problem, remaining_windows(certificate))
+    return replace(problem, windows=remaining_windows(certificate))
 
 
 def files_of_entry(sidecar: dict[str, Any]) -> list[str]:

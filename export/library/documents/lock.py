@@ -19,19 +19,19 @@ def library_lock(folder: Path, action: str, progress: Progress = silent) -> Iter
     """
     if sys.platform == "win32":
         yield
-        return
-    import fcntl
+    else:
+        import fcntl
 
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        with suppress(OSError):
-            try:
-                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                progress(f"{action} waits for another process, which is at work on {folder}")
-                fcntl.flock(descriptor, fcntl.LOCK_EX)
-        yield
-    finally:
-        with suppress(OSError):  # in child processes, too, which have the descriptor
-            fcntl.flock(descriptor, fcntl.LOCK_UN)
-        os.close(descriptor)
+        descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            with suppress(OSError):
+                try:
+                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except BlockingIOError:
+                    progress(f"{action} waits for another process, which is at work on {folder}")
+                    fcntl.flock(descriptor, fcntl.LOCK_EX)
+            yield
+        finally:
+            with suppress(OSError):  # in child processes, too, which have the descriptor
+                fcntl.flock(descriptor, fcntl.LOCK_UN)
+            os.close(descriptor)

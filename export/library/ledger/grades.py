@@ -1,7 +1,7 @@
 """Status and grade of an entry, from its dual bounds and runs; the best run of each solver.
 
 A solver's tolerances may put its bound a little above the objective of a point that is feasible to 1e-16.
-Within `bound_tolerance` it is cut to that objective; a larger one contradicts the point.
+Within _LIFT of its size, or of 1, it is cut to that objective; a larger one contradicts the point.
 
 A bound of a program is a claim, which nobody can check. If programs of three makers agree on it, it is still
 no proof. A certificate or the tangent is one.
@@ -28,6 +28,7 @@ Difficulty = Literal["easy", "hard", "open"]
 EASY: Final = 60.0  # seconds
 PROVEN: Final = (1e-6, 1e-9)  # greatest gap of an optimal point: relative part, absolute part
 ACCEPTED_VIOLATION: Final = 1e-8  # greatest violation of a point that a library accepts
+_LIFT: Final = 1e-6  # by which the tolerances of solvers may lift a bound above the optimum
 SAME: Final = 1e-9  # objectives this close, relative to their size or absolute, are the same
 AGREE: Final = 3  # programs of different makers that must agree
 MAKERS: Final = {solver.title: solver.maker for solver in SOLVERS.values()}  # by title
@@ -38,24 +39,14 @@ _SHOWN: Final = {"objective": "primal", "limit": "time_limit"} | {
 """Keys of a run in a sidecar, and fields of a record."""
 
 
-def bound_tolerance(objective: float) -> float:
-    """Return the distance by which a solver's tolerances may lift its bound above the optimum."""
-    return 1e-6 * max(1.0, abs(objective))
-
-
 def is_refuted(bound: float, objective: float) -> bool:
-    """Whether a bound lies so far above the objective of a feasible point that it cannot be a bound."""
-    return bound - objective > bound_tolerance(objective)
+    """Whether a bound is so far above the objective of a feasible point that no tolerance explains it."""
+    return bound - objective > _LIFT * max(1.0, abs(objective))
 
 
 def is_better(objective: float, known: float) -> bool:
     """Whether an objective is lower than the best known one by more than rounding."""
     return known - objective > SAME * max(abs(known), SAME)
-
-
-def cut_bound(bound: float, objective: float) -> float:
-    """Return the bound, or the objective of the best feasible point if that is lower."""
-    return min(bound, objective)
 
 
 def is_proven(objective: float, bound: float) -> bool:
@@ -88,7 +79,7 @@ def shown_runs(records: Iterable[Record], entry: str, objective: float) -> list[
     for record in best_runs((record for record in records if record.entry == entry), entry):
         shown = {key: getattr(record, name) for key, name in _SHOWN.items()}
         if record.bound is not None:
-            shown["bound"] = cut_bound(record.bound, objective)
+            shown["bound"] = min(record.bound, objective)
         known = {key: value for key, value in shown.items() if value is not None}
         runs.append({"solver": record.solver, "version": record.version, "status": record.status} | known)
     return runs
@@ -101,28 +92,21 @@ def entry_status(
     computed = [
         bound for bound in bounds if bound["status"] == "computed" and is_proven(objective, bound["bound"])
     ]
-    for by, proofs in (
-        ("certificate", [bound for bound in computed if "certificate" in bound]),
-        ("tangent", [bound for bound in computed if "certificate" not in bound]),
-    ):
-        if proofs:
-            programs = [{key: bound[key] for key in ("solver", "version")} for bound in proofs]
-            return {"status": "optimal", "solved": {"by": by, "programs": programs}}
-    claims = [
-        record
-        for record in records
-        if record.bound is not None and is_proven(objective, cut_bound(record.bound, objective))
-    ]
+    certified = [bound for bound in computed if "certificate" in bound]
+    if computed:
+        programs = [{key: bound[key] for key in ("solver", "version")} for bound in certified or computed]
+        by = "certificate" if certified else "tangent"
+        return {"status": "optimal", "solved": {"by": by, "programs": programs}}
+    claims = [record for record in records if record.bound is not None and is_proven(objective, record.bound)]
     if not claims:
         return {"status": "best known"}
     makers = {MAKERS[record.solver] for record in claims if record.solver in MAKERS}
-    programs = [_program(record, entry) for record in best_runs(claims, entry)]
+    programs = [
+        {"solver": record.solver, "version": record.version}
+        | ({} if record.entry == entry else {"via": record.entry})
+        for record in best_runs(claims, entry)
+    ]
     return {"status": "agreed" if len(makers) >= AGREE else "claimed", "claimed": programs}
-
-
-def _program(record: Record, entry: str) -> dict[str, Any]:
-    via = {} if record.entry == entry else {"via": record.entry}
-    return {"solver": record.solver, "version": record.version} | via
 
 
 def difficulty(status: str, objective: float, runs: Iterable[Record], *, tangent: bool) -> Difficulty:
@@ -138,7 +122,7 @@ def difficulty(status: str, objective: float, runs: Iterable[Record], *, tangent
         and run.seconds is not None
         and run.seconds <= EASY
         and run.bound is not None
-        and is_proven(objective, cut_bound(run.bound, objective))
+        and is_proven(objective, run.bound)
         for run in runs
     )
     return "easy" if tangent or any(quick) else "hard"

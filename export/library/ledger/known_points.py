@@ -20,18 +20,9 @@ from ....models.instance.instance import Instance
 from ....models.storage import read_bytes
 from ..documents.documents import Library, about_file, existing_folder, files_of_instance, read_about
 from ..plan.recipe import digest
-from .points import (
-    METHOD,
-    CheckedCertificate,
-    KnownField,
-    Provenance,
-    certificate_file,
-    check_certificate,
-    provenance_by,
-)
+from .grades import SAME
+from .points import CheckedCertificate, KnownField, certificate_file, check_certificate
 
-ROLES: Final = ("baseline", "least_mixed", "least_1", "least_2")
-_SAME: Final = 1e-9  # processors round energies differently
 _REMEDY: Final = "make the points again with `crossfield library build --search`"
 
 
@@ -55,7 +46,7 @@ class InstancePoints:
         """Return the field of a role in ROLES. Raises InstanceError for a damaged field."""
         facts = self.about["fields"][role]
         with naming(facts["file"]):
-            return KnownField(field_of_json(self.files[facts["file"]]), Provenance.of(facts))
+            return KnownField.of(field_of_json(self.files[facts["file"]]), facts)
 
     def certificates(self, instance: Instance, norms: Collection[Norm]) -> list[CheckedCertificate]:
         """Return the certificates in some norms, checked.
@@ -67,13 +58,12 @@ class InstancePoints:
 
     def _certificate(self, instance: Instance, norm: Norm, stated: dict[str, Any]) -> CheckedCertificate:
         facts = dict(stated)
-        name = facts.pop("file")
-        certificate = check_certificate(self.files[name], name, instance, provenance_by(METHOD))
-        proven = certificate.facts
-        is_same = (norm, facts["status"], facts["bound"]) == (
-            certificate.norm, proven["status"], proven["bound"],
-        )  # fmt: skip
-        if not is_same or not math.isclose(facts["energy"], proven["energy"], rel_tol=_SAME, abs_tol=_SAME):
+        name, energy = facts.pop("file"), facts["energy"]
+        certificate = check_certificate(self.files[name], name, instance)
+        proven = certificate.facts | {"energy": energy}  # processors round energies differently
+        if (certificate.norm, proven) != (norm, facts) or not math.isclose(
+            energy, certificate.facts["energy"], rel_tol=SAME, abs_tol=SAME
+        ):
             reason = f"states another norm, status, bound or energy than {name}; {_REMEDY}"
             raise InputError(reason, file=about_file(self.about["name"]))
         return replace(certificate, file=certificate_file(self.about["name"], norm), facts=facts)
@@ -92,35 +82,27 @@ def read_points(path: str | Path) -> PointSource:
 def read_instance_points(path: Path) -> InstancePoints:
     """Read the results whose document is a file. Raises InputError, InstanceError for a damaged file."""
     about = read_about(path)
-    name = about_file(about["name"])
-    if path.name != name:
-        raise InputError(f"is about {about['name']}; its name must be {name}", file=path)
     points = _points_of(path.parent, about)
     facts = [about["name"], about["instance"]["sha256"], about["fields"], about.get("certificates")]
     contents = {name: hashlib.sha256(data).hexdigest() for name, data in points.files.items()}
     return replace(points, sha256=digest([*facts, contents]))
 
 
-def given_points_of(folder: Path) -> PointSource:
-    """Return the given points of a library as it holds them."""
+def points_of(library: Library, *, strict: bool) -> PointSource:
+    """Return the fields and certificates of a library, found or given.
 
-    def of(instance: str) -> InstancePoints | None:
-        try:
-            about = read_about(folder / about_file(instance))
-            return _points_of(folder, about) if "given" in about else None
-        except CrossfieldError:  # to be made again
-            return None
-
-    return of
-
-
-def all_points_of(library: Library) -> PointSource:
-    """Return the fields and certificates of a library, found or given. Its calls raise InputError."""
+    strict: whether damaged ones raise InputError; otherwise they are passed over.
+    """
 
     def of(instance: str) -> InstancePoints | None:
         if instance in library.skipped:
             return None
-        return _points_of(library.folder, read_about(library.folder / about_file(instance)))
+        try:
+            return _points_of(library.folder, read_about(library.folder / about_file(instance)))
+        except CrossfieldError:
+            if strict:
+                raise
+            return None
 
     return of
 

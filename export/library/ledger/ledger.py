@@ -63,20 +63,19 @@ class Record:
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
                 raise InputError(f"{name} is {value}; give a finite number")
-        error = schema_error(Ledger(Path(), (self,)).document(), "library-ledger", documents.__name__)
+        error = schema_error(Ledger((self,)).document(), "library-ledger", documents.__name__)
         if error is not None:
             raise InputError(describe_schema_error(error).removeprefix("records[0]."))
 
 
 @dataclass(frozen=True)
 class SubmittedCertificate:
-    """A submitted certificate. instance: its name; by: who submitted it."""
+    """A submitted certificate. instance: its name."""
 
     instance: str
     norm: Norm
     instance_sha256: str
     file: str
-    by: str | None = None
 
     @property
     def key(self) -> tuple[str, str]:
@@ -86,20 +85,11 @@ class SubmittedCertificate:
 
 @dataclass(frozen=True)
 class Ledger:
-    """Records and certificates in order, and their folder. unwritten: files that it lacks, by name."""
+    """Records and certificates in order, and the contents of their files by name."""
 
-    folder: Path
     records: tuple[Record, ...] = ()
     certificates: tuple[SubmittedCertificate, ...] = ()
-    unwritten: Mapping[str, bytes] = field(default_factory=dict)
-
-    def records_of(self, entry: str, problem_sha256: str) -> list[Record]:
-        """Return the records of an entry about this problem."""
-        return [
-            record
-            for record in self.records
-            if (record.entry, record.problem_sha256) == (entry, problem_sha256)
-        ]
+    files: Mapping[str, bytes] = field(default_factory=dict)
 
     def record_with_field(self, entry: str) -> Record | None:
         """Return the record whose field is kept for an entry: the last one with a field."""
@@ -107,21 +97,11 @@ class Ledger:
             (record for record in reversed(self.records) if record.entry == entry and record.point), None
         )
 
-    @property
-    def files(self) -> list[str]:
-        """Names of all files of records and certificates."""
-        points = [record.point for record in self.records if record.point is not None]
-        return [*points, *(certificate.file for certificate in self.certificates)]
-
-    def read_file(self, name: str) -> bytes:
-        """Return the content of a file. Raises InputError if it is missing."""
-        return self.unwritten[name] if name in self.unwritten else read_bytes(self.folder / name)
-
     def read_field(self, record: Record) -> CrossField:
-        """Return the field of a record. Raises InputError, InstanceError for a missing or damaged file."""
-        data = self.read_file(str(record.point))
-        with naming(self.folder / str(record.point)):
-            return field_of_json(data)
+        """Return the field of a record. Raises InstanceError for a damaged file."""
+        name = str(record.point)
+        with naming(name):
+            return field_of_json(self.files[name])
 
     def with_record(self, record: Record, field: CrossField | None = None) -> tuple[Ledger, Record]:
         """Return the ledger with one more record, and that record with its file.
@@ -130,64 +110,65 @@ class Ledger:
         ledger cannot hold.
         """
         record.check()
-        records, unwritten = list(self.records), dict(self.unwritten)
+        records, files = list(self.records), dict(self.files)
         if field is not None and _is_better(record, self.record_with_field(record.entry)):
-            name, data = f"{record.entry}.field.json", field_to_json(field)
-            unwritten[name] = data
+            name = f"{record.entry}.field.json"
+            files[name] = field_to_json(field)
             record = replace(record, point=name)
             records = [_without_point(row) if row.entry == record.entry else row for row in records]
         records = sorted({*records, record}, key=lambda row: row.rank)
-        return replace(self, records=tuple(records), unwritten=unwritten), record
+        return replace(self, records=tuple(records), files=files), record
 
-    def with_certificate(
-        self, instance: str, norm: Norm, instance_sha256: str, data: bytes, by: str | None = None
-    ) -> Ledger:
+    def with_certificate(self, instance: str, norm: Norm, instance_sha256: str, data: bytes) -> Ledger:
         """Return the ledger with a certificate that replaces the earlier one of the instance in the norm."""
         name = f"{instance}.{hashlib.sha256(data).hexdigest()[:12]}.certificate.npz"
-        new = SubmittedCertificate(instance, norm, instance_sha256, name, by)
+        new = SubmittedCertificate(instance, norm, instance_sha256, name)
         others = [certificate for certificate in self.certificates if certificate.key != new.key]
         certificates = tuple(sorted([*others, new], key=lambda certificate: certificate.key))
-        return replace(self, certificates=certificates, unwritten={**self.unwritten, name: data})
+        return replace(self, certificates=certificates, files={**self.files, name: data})
 
     def document(self) -> dict[str, Any]:
         """Return the ledger as JSON."""
-        certificates = list(map(_row_document, self.certificates))
-        return {
-            "format": FORMAT,
-            "version": VERSION,
-            "records": list(map(_row_document, self.records)),
-            **({"certificates": certificates} if certificates else {}),
-        }
+        records, certificates = (
+            [{key: value for key, value in vars(row).items() if value is not None} for row in rows]
+            for rows in (self.records, self.certificates)
+        )
+        document = {"format": FORMAT, "version": VERSION, "records": records}
+        return document | ({"certificates": certificates} if certificates else {})
 
 
-def _row_document(row: Record | SubmittedCertificate) -> dict[str, Any]:
-    """The known facts of a row by key."""
-    return {key: value for key, value in asdict(row).items() if value is not None}
+def read_ledger(folder: str | Path, name: str = LEDGER, *, omit_missing: bool = False) -> Ledger:
+    """Read the ledger of a folder; an empty one without a file. Raises InputError, InstanceError.
 
-
-def read_ledger(folder: str | Path, name: str = LEDGER) -> Ledger:
-    """Read the ledger of a folder; an empty one without a file. Raises InputError, InstanceError."""
+    omit_missing: whether records lose a field whose file is missing, and such certificates are left out.
+    """
     path = Path(folder) / name
     if not path.exists():
-        return Ledger(Path(folder))
+        return Ledger()
     schema, remedy = documents.__name__, "give the ledger.json of a library"
     document = read_document(path, FORMAT, VERSION, "library-ledger", schema, remedy=remedy)
+    records = tuple(Record(**row) for row in document["records"])
     certificates = tuple(SubmittedCertificate(**row) for row in document.get("certificates", ()))
-    return Ledger(Path(folder), tuple(Record(**row) for row in document["records"]), certificates)
+    if omit_missing:
+        records = tuple(
+            _without_point(record) if record.point and not path.with_name(record.point).exists() else record
+            for record in records
+        )
+        certificates = tuple(row for row in certificates if path.with_name(row.file).exists())
+    names = [record.point for record in records if record.point] + [row.file for row in certificates]
+    return Ledger(records, certificates, {name: read_bytes(path.with_name(name)) for name in names})
 
 
-def write_ledger(ledger: Ledger) -> None:
-    """Write a ledger and, before it, the files that are not in its folder yet. Raises OutputError.
+def write_ledger(folder: Path, ledger: Ledger) -> None:
+    """Write a ledger into a folder and, before it, the files that are not there yet. Raises OutputError.
 
     Ctrl-C is raised at the end, because a ledger does not fit a part of its files.
     """
-    path = ledger.folder / LEDGER
     data = (json.dumps(ledger.document(), indent=1, allow_nan=False) + "\n").encode()
     with catch_interrupts() as pressed:
-        for name, content in ledger.unwritten.items():
-            write_bytes(ledger.folder / name, content)
-        if not path.exists() or read_bytes(path) != data:
-            write_bytes(path, data)
+        for name, content in {**ledger.files, LEDGER: data}.items():
+            if not (folder / name).exists() or read_bytes(folder / name) != content:
+                write_bytes(folder / name, content)
     if pressed():
         raise KeyboardInterrupt
 
@@ -195,7 +176,7 @@ def write_ledger(ledger: Ledger) -> None:
 def add_record(folder: str | Path, record: Record, field: CrossField | None = None) -> Record:
     """Add a record to the ledger of a folder, whose lock the caller holds, and write the ledger."""
     ledger, record = read_ledger(folder).with_record(record, field)
-    write_ledger(ledger)
+    write_ledger(Path(folder), ledger)
     return record
 
 
@@ -210,34 +191,29 @@ def _without_point(record: Record) -> Record:
     return replace(record, point=None)
 
 
-def merge_ledgers(folder: Path, source: Ledger, entries: Iterable[str], instances: Iterable[str]) -> Ledger:
-    """Return the ledger of a folder with another's records on these entries and instances.
+def merge_ledgers(ledger: Ledger, source: Ledger, entries: Iterable[str], instances: Iterable[str]) -> Ledger:
+    """Return a ledger with another's records on these entries and certificates of these instances.
 
-    A field or certificate that the folder has already stays; nothing is written.
+    A field or certificate that the ledger has already stays. Raises InstanceError for a damaged field.
     """
-    ledger, wanted = read_ledger(folder), set(entries)
-    have = {_without_point(record) for record in ledger.records}
-    fresh: list[Record] = []
-    unwritten: dict[str, bytes] = {}
-    for record in source.records:
-        if record.entry not in wanted or _without_point(record) in have:
-            continue
-        if record.point is not None and ledger.record_with_field(record.entry) is None:
+    wanted, known = set(entries), {_without_point(record) for record in ledger.records}
+    fresh = [
+        _without_point(record) if ledger.record_with_field(record.entry) else record
+        for record in source.records
+        if record.entry in wanted and _without_point(record) not in known
+    ]
+    for record in fresh:
+        if record.point is not None:
             source.read_field(record)  # checked before it is taken over
-            unwritten[record.point] = source.read_file(record.point)
-            fresh.append(record)
-        else:
-            fresh.append(_without_point(record))
-    wanted, present = set(instances), {certificate.key for certificate in ledger.certificates}
+    wanted, known_keys = set(instances), {certificate.key for certificate in ledger.certificates}
     certificates = [
         certificate
         for certificate in source.certificates
-        if certificate.instance in wanted and certificate.key not in present
+        if certificate.instance in wanted and certificate.key not in known_keys
     ]
-    unwritten |= {certificate.file: source.read_file(certificate.file) for certificate in certificates}
-    return replace(
-        ledger,
-        records=tuple(sorted({*ledger.records, *fresh}, key=lambda row: row.rank)),
-        certificates=tuple(sorted([*ledger.certificates, *certificates], key=lambda row: row.key)),
-        unwritten=unwritten,
+    names = [record.point for record in fresh if record.point] + [row.file for row in certificates]
+    return Ledger(
+        tuple(sorted({*ledger.records, *fresh}, key=lambda row: row.rank)),
+        tuple(sorted([*ledger.certificates, *certificates], key=lambda row: row.key)),
+        {**ledger.files, **{name: source.files[name] for name in names}},
     )

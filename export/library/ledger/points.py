@@ -1,4 +1,4 @@
-"""KnownField fields and certificates, and the points of every formulation with a field.
+"""Known fields and certificates, and the points of every formulation with a field.
 
 A field (angles and jumps) gives a point of any formulation: every other column has its best value, without
 solver tolerances.
@@ -6,7 +6,7 @@ solver tolerances.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -24,36 +24,36 @@ from ...formats.registry import program_version
 from .grades import ACCEPTED_VIOLATION
 
 METHOD: Final = "prove"
-_SUFFIXES: Final[dict[Norm, str]] = {2: "", 1: ".l1", "mixed": ".mixed"}
+ROLES: Final = {"baseline": ".baseline", "least_mixed": ".mixed", "least_1": ".l1", "least_2": ""}
+"""Roles of known fields, and the suffixes of their files; equal fields share the last file."""
+_ORIGIN: Final = ("solver", "version", "seconds", "by")
 
 
-@dataclass(frozen=True)
-class Provenance:
-    """Origin of a field: solver and version; seconds and submitter of a submitted field."""
+@dataclass(frozen=True, eq=False)
+class KnownField:
+    """A known field, with solver and version that found it; seconds and submitter of a submitted one."""
 
+    field: CrossField
     solver: str
     version: str
     seconds: float | None = None
     by: str | None = None
 
     @classmethod
-    def of(cls, facts: dict[str, Any]) -> Provenance:
-        """Return the provenance of a field from its facts in a document."""
-        return cls(facts["solver"], facts["version"], facts["seconds"], facts["by"])
+    def of(cls, field: CrossField, facts: Mapping[str, Any]) -> KnownField:
+        """Return a field with the origin that a document states."""
+        return cls(field, **{key: facts[key] for key in _ORIGIN})
+
+    @property
+    def origin(self) -> dict[str, Any]:
+        """Its origin, for a document."""
+        return {key: getattr(self, key) for key in _ORIGIN}
 
 
-@dataclass(frozen=True, eq=False)
-class KnownField:
-    """A known field and its provenance."""
-
-    field: CrossField
-    provenance: Provenance
-
-
-def provenance_by(method: str) -> Provenance:
-    """Return the provenance of a field that crossfield found by a method."""
+def finder(method: str) -> tuple[str, str]:
+    """Return crossfield with a method, and its version, as the solver that found something."""
     name, _, version = program_version().partition(" ")
-    return Provenance(f"{name} ({method})", version)
+    return f"{name} ({method})", version
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,23 +67,23 @@ class CheckedCertificate:
     facts: dict[str, Any]
 
     @classmethod
-    def of(cls, certificate: Claim, file: str, data: bytes, provenance: Provenance) -> CheckedCertificate:
+    def of(cls, claim: Claim, file: str, data: bytes) -> CheckedCertificate:
         """Return it as the checker found it."""
-        facts = {key: getattr(certificate, key) for key in ("status", "energy", "bound")}
-        return cls(certificate.norm, KnownField(certificate.field, provenance), file, data, facts)
+        facts = {key: getattr(claim, key) for key in ("status", "energy", "bound")}
+        return cls(claim.norm, KnownField(claim.field, *finder(METHOD)), file, data, facts)
 
 
 def certificate_file(instance: str, norm: Norm) -> str:
     """Return the name of the file of a certificate that a build made."""
-    return f"{instance}{_SUFFIXES[norm]}.certificate.npz"
+    return f"{instance}{ROLES[f'least_{norm}']}.certificate.npz"
 
 
-def check_certificate(data: bytes, file: str, on: Instance, provenance: Provenance) -> CheckedCertificate:
+def check_certificate(data: bytes, file: str, on: Instance) -> CheckedCertificate:
     """Check the bytes of a certificate of an instance. Raises as `read_certificate`."""
     with temporary_folder() as folder:
         path = folder / file
         path.write_bytes(data)
-        return CheckedCertificate.of(read_certificate(path, on=on), file, data, provenance)
+        return CheckedCertificate.of(read_certificate(path, on=on), file, data)
 
 
 def least_energy(known: Sequence[KnownField], norm: Norm) -> KnownField:
@@ -119,7 +119,7 @@ def clipped_field(problem: Problem, point: Floats) -> CrossField:
 
 @dataclass(frozen=True, eq=False)
 class BestPoint:
-    """The best known point of a problem with its field and provenance."""
+    """The best known point of a problem with its field."""
 
     problem: Problem
     known: KnownField
@@ -130,25 +130,6 @@ class BestPoint:
         """The recomputed objective."""
         return self.problem.objective_value(self.point)
 
-    @property
-    def is_feasible(self) -> bool:
-        """Whether no violation exceeds ACCEPTED_VIOLATION."""
-        return self.problem.violation(self.point).worst <= ACCEPTED_VIOLATION
-
-    def facts(self) -> dict[str, Any]:
-        """Return objective, worst violation, integrality, energy of the field, and provenance."""
-        violation, provenance = self.problem.violation(self.point), self.known.provenance
-        return {
-            "objective": self.objective,
-            "violation": max(violation.rows, violation.bounds),
-            "integrality": violation.integrality,
-            "solver": provenance.solver,
-            "version": provenance.version,
-            "seconds": provenance.seconds,
-            "by": provenance.by,
-            "energy_2norm": self.known.field.energy().total,
-        }
-
 
 def best_point(
     problem: Problem, known: Sequence[KnownField], certified: CrossField | None = None
@@ -158,9 +139,12 @@ def best_point(
     certified: field of the certificate of a tightened problem, if no known field is in its windows.
     """
     points = [BestPoint(problem, field, complete_point(problem, field.field)) for field in known]
-    inside = [point for point in points if problem.windows is None or point.is_feasible]
+    inside = [
+        best
+        for best in points
+        if problem.windows is None or problem.violation(best.point).worst <= ACCEPTED_VIOLATION
+    ]
     if not inside and certified is not None:
-        return BestPoint(
-            problem, KnownField(certified, provenance_by(METHOD)), complete_point(problem, certified)
-        )
+        proven = KnownField(certified, *finder(METHOD))
+        return BestPoint(problem, proven, complete_point(problem, certified))
     return min(inside, key=lambda best: best.objective)

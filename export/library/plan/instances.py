@@ -1,4 +1,4 @@
-"""Instances of recipes, from samples, drawings and random strokes."""
+"""Instances of recipes, from samples, drawings, random strokes and meshes."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ....models.errors import CrossfieldError, InputError, NoStrokeError
 from ....models.instance.instance import Gauge, Instance
 from ....models.samples.samples import sample
 from ....models.sketch.drawing_file import parse_drawing
-from ....models.sketch.random_strokes import random_instance
+from ....models.sketch.random_strokes import RAGGED_SHARE, random_instance
 from ....models.sketch.read import instance_of_drawing, read_mask
 from ....models.sketch.samples import SAMPLES
 from .recipe import InstanceRecipe
@@ -18,15 +18,17 @@ from .recipe import InstanceRecipe
 
 def make_instance(recipe: InstanceRecipe) -> Instance:
     """Return the instance of a recipe. Raises InputError; NoStrokeError if its size leaves no strokes."""
-    if recipe.sketch.kind == "mesh":
-        return replace(sample(recipe.sketch.what, gauge=cast("Gauge", recipe.gauge)), name=recipe.name)
-    make = {"sample": _sample_instance, "file": _drawing_instance, "random": _random_instance}[
-        recipe.sketch.kind
-    ]
+    sketch = recipe.sketch
     try:
-        # The coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
-        of_paper = {name: getattr(Instance, name) for name in ("stroke_coefficient", "skew_coefficient")}
-        return replace(make(recipe), name=recipe.name, **of_paper)
+        instance = replace(_draw_instance(recipe), name=recipe.name)
+        if sketch.kind != "mesh":
+            # The coefficients of the paper, 1 and 1e-6, on every grid, so that published results apply.
+            instance = replace(
+                instance,
+                stroke_coefficient=Instance.stroke_coefficient,
+                skew_coefficient=Instance.skew_coefficient,
+            )
+        return instance.with_weights(stroke_weight=sketch.stroke_weight, skew_weight=sketch.skew_weight)
     except NoStrokeError as error:
         raise NoStrokeError(f"{recipe.name}: {error}") from error
     except CrossfieldError as error:
@@ -39,26 +41,18 @@ def kind_of(recipe: InstanceRecipe) -> str:
     return SAMPLES[recipe.sketch.what].kind if kind == "sample" else kind
 
 
-def _sample_instance(recipe: InstanceRecipe) -> Instance:
-    return sample(recipe.sketch.what, recipe.size, gauge=cast("Gauge", recipe.gauge))
-
-
-def _drawing_instance(recipe: InstanceRecipe) -> Instance:
-    sketch = recipe.sketch
-    drawing = parse_drawing(sketch.drawing, Path(sketch.what).suffix, recipe.size)
-    white = read_mask(sketch.mask, drawing) if sketch.mask else None
-    gauge = cast("Gauge", recipe.gauge)
-    return instance_of_drawing(
-        drawing, recipe.size, white=white, name=recipe.name, source=sketch.what, gauge=gauge
-    )
-
-
-def _random_instance(recipe: InstanceRecipe) -> Instance:
+def _draw_instance(recipe: InstanceRecipe) -> Instance:
+    sketch, size, gauge = recipe.sketch, recipe.size, cast("Gauge", recipe.gauge)
+    if sketch.kind == "mesh":
+        return sample(sketch.what, gauge=gauge)
+    if sketch.kind == "sample":
+        return sample(sketch.what, size, gauge=gauge)
+    if sketch.kind == "file":
+        drawing = parse_drawing(sketch.drawing, Path(sketch.what).suffix, size)
+        white = read_mask(sketch.mask, drawing) if sketch.mask else None
+        return instance_of_drawing(
+            drawing, size, white=white, name=recipe.name, source=sketch.what, gauge=gauge
+        )
     assert recipe.seed is not None  # as the schema of specifications demands
-    return random_instance(
-        recipe.seed,
-        size=recipe.size,
-        gauge=cast("Gauge", recipe.gauge),
-        name=recipe.name,
-        **recipe.sketch.drawn,
-    )
+    mask_share = RAGGED_SHARE if sketch.what == "ragged" else 1.0
+    return random_instance(recipe.seed, size=size, share=sketch.share, mask_share=mask_share, gauge=gauge)

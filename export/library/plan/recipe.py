@@ -9,48 +9,25 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from collections.abc import Container, Iterable
-from dataclasses import asdict, dataclass, fields, replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import cache
+from itertools import product
 from typing import Any, Final
 
-from ....models.errors import InputError
+from ....models.errors import InputError, UnsupportedByFormatError
 from ....models.field.field import Norm
-from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS, norm_of
+from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS
+from ....models.formulations.choice import declare, norm_of
+from ...formats.registry import FORMATS, problem_in_format
+from ...solvers_table import smallest_problem
 from .spec import Rung, Sketch, Spec
 
 LONGEST: Final = 32  # characters of a name before its suffix
+_OF_SKETCH: Final = ("kind", "what", "title", "origin", "added")
 NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
-
-
-@dataclass(frozen=True)
-class InstanceRecipe:
-    """Recipe of an instance. seed: of random sketches; prove: the norms in which to prove its optimum.
-
-    added: the day of its addition to the library; empty if not stated.
-    """
-
-    name: str
-    sketch: Sketch
-    rung: str
-    size: int
-    seed: int | None
-    gauge: str
-    prove: tuple[Norm, ...] = ()
-    added: str = ""
-
-    def document(self) -> dict[str, Any]:
-        """Return everything that determines its content, as JSON."""
-        hashes = [hashlib.sha256(data).hexdigest() for data in (self.sketch.drawing, self.sketch.mask)]
-        sketch = {
-            "kind": self.sketch.kind,
-            "what": self.sketch.what,
-            "title": self.sketch.title,
-            "sha256": hashes,
-            "origin": self.sketch.origin.document(),
-            **self.sketch.settings(),
-        }
-        return {field.name: getattr(self, field.name) for field in fields(self)} | {"sketch": sketch}
 
 
 @dataclass(frozen=True)
@@ -70,10 +47,6 @@ class EntryRecipe:
         """The norm whose energy the entry minimises over all jumps; None without one."""
         return norm_minimised(self.formulation, self.facet)
 
-    def document(self) -> dict[str, Any]:
-        """Return everything that determines its files, beyond its instance, as JSON."""
-        return {key: value for key, value in asdict(self).items() if (key, value) != ("tightened", False)}
-
     def reason_to_skip(self, about: dict[str, Any]) -> str:
         """Return why it cannot be made from the document of its instance; empty if it can."""
         if not self.tightened or str(self.norm) in about.get("certificates", {}):
@@ -83,11 +56,28 @@ class EntryRecipe:
 
 
 @dataclass(frozen=True)
-class InstancePlan:
-    """An instance and its entries, in order."""
+class InstanceRecipe:
+    """Recipe of an instance with its entries.
 
-    recipe: InstanceRecipe
-    entries: tuple[EntryRecipe, ...]
+    seed: of random sketches. prove: the norms in which to prove its optimum.
+    """
+
+    name: str
+    sketch: Sketch
+    rung: str
+    size: int
+    seed: int | None
+    gauge: str
+    prove: tuple[Norm, ...] = ()
+    entries: tuple[EntryRecipe, ...] = ()
+
+    def document(self) -> dict[str, Any]:
+        """Return everything that determines its content, as JSON."""
+        sketch = self.sketch
+        stated: dict[str, Any] = {key: getattr(sketch, key) for key in _OF_SKETCH}
+        stated["sha256"] = [hashlib.sha256(data).hexdigest() for data in (sketch.drawing, sketch.mask)]
+        others = {key: value for key, value in vars(self).items() if key != "entries"}
+        return others | {"sketch": stated | sketch.settings()}
 
 
 def entry_name(instance: str, formulation: str, facet: str, *, tightened: bool = False) -> str:
@@ -96,30 +86,52 @@ def entry_name(instance: str, formulation: str, facet: str, *, tightened: bool =
     return f"{instance}{printed}_{FORMULATIONS[formulation].short}{'_tight' if tightened else ''}"
 
 
-def without_skipped(plans: Iterable[InstancePlan], skipped: Container[str]) -> tuple[InstancePlan, ...]:
-    """Return plans without the instances and entries that were skipped."""
+def without_skipped(recipes: Iterable[InstanceRecipe], skipped: Container[str]) -> tuple[InstanceRecipe, ...]:
+    """Return recipes without the instances and entries that were skipped."""
     return tuple(
-        replace(planned, entries=tuple(entry for entry in planned.entries if entry.name not in skipped))
-        for planned in plans
-        if planned.recipe.name not in skipped
+        replace(recipe, entries=tuple(entry for entry in recipe.entries if entry.name not in skipped))
+        for recipe in recipes
+        if recipe.name not in skipped
     )
 
 
-def plan_library(spec: Spec) -> tuple[InstancePlan, ...]:
-    """Return every instance of a specification with its entries. Raises InputError for a long name."""
-    plans = tuple(
-        InstancePlan(recipe, _entries(recipe, rung, spec.formulations))
+def plan_library(spec: Spec) -> tuple[InstanceRecipe, ...]:
+    """Return every instance of a specification with its entries.
+
+    Raises InputError for a long or double name, and for a formulation that no format of its rung holds.
+    """
+    recipes = [
+        recipe
         for sketch in spec.sketches
         for rung in spec.rungs
         if rung.name in sketch.rungs
-        for recipe in _instances(sketch, rung, norms_of(spec.formulations) if sketch.proves(rung) else ())
-    )
-    for name in (entry.name for planned in plans for entry in planned.entries):
-        if len(name) > LONGEST:
+        for recipe in _instances(sketch, rung, spec.formulations)
+    ]
+    longest = max((entry.name for recipe in recipes for entry in recipe.entries), key=len, default="")
+    if len(longest) > LONGEST:
+        raise InputError(
+            f"the name {longest} has {len(longest)} characters; shorten the sketch's name to reach {LONGEST}"
+        )
+    for name, count in Counter(recipe.name for recipe in recipes).items():
+        if count > 1:
+            raise InputError(f"{name} is on two rungs, and names carry the size alone; keep it on one")
+    for entry in (entry for recipe in recipes for entry in recipe.entries):
+        if not _fits_a_format(entry.formulation, entry.formats):
             raise InputError(
-                f"the name {name} has {len(name)} characters; shorten the sketch's name to reach {LONGEST}"
+                f"no format of the rung of {entry.name} holds {entry.formulation}; add nl or gms, or omit it"
             )
-    return plans
+    return tuple(recipe for recipe in recipes if recipe.entries)
+
+
+@cache
+def _fits_a_format(formulation: str, formats: tuple[str, ...]) -> bool:
+    """Whether a format holds the problems of a formulation."""
+    problem = smallest_problem(declare(formulation))
+    for file_format in formats:
+        with suppress(UnsupportedByFormatError):
+            problem_in_format(problem, FORMATS[file_format])
+            return True
+    return False
 
 
 @cache
@@ -131,37 +143,19 @@ def norm_minimised(formulation: str, facet: str = "hull") -> Norm | None:
     return norm_of(declared, declared.options({"facet": facet} if "facet" in declared.option_names else {}))
 
 
-def norms_of(formulations: Iterable[str]) -> tuple[Norm, ...]:
-    """Return the norms whose energies formulations minimise over all jumps."""
-    minimised = set(map(norm_minimised, formulations))
-    return tuple(norm for norm in NORMS if norm in minimised)
-
-
-def _instances(sketch: Sketch, rung: Rung, norms: tuple[Norm, ...]) -> list[InstanceRecipe]:
-    return [
-        InstanceRecipe(
-            _instance_name(sketch, size, seed, gauge),
-            sketch,
-            rung.name,
-            size,
-            seed,
-            gauge,
-            # Bounds are weak under the gauge `box`. Orthogonal crosses have proofs in the 2-norm alone.
-            prove=tuple(
-                norm for norm in norms if gauge == "strokes" and (norm == 2 or not sketch.orthogonal)
-            ),
-            added=max(sketch.added, rung.added),
-        )
-        for size in sketch.sizes_on(rung)
-        for seed in sketch.seeds
-        for gauge in rung.gauges
-    ]
-
-
-def _instance_name(sketch: Sketch, size: int, seed: int | None, gauge: str) -> str:
-    sized = f"f{size:04}" if sketch.kind == "mesh" else f"n{size:03}"
-    seeded = "" if seed is None else f"_s{seed}"
-    return f"cf_{sketch.name}_{sized}{seeded}{'_box' if gauge == 'box' else ''}"
+def _instances(sketch: Sketch, rung: Rung, formulations: tuple[str, ...]) -> list[InstanceRecipe]:
+    minimised = set(map(norm_minimised, formulations)) if sketch.proves(rung) else set()
+    # Orthogonal crosses have proofs in the 2-norm alone. Bounds are weak under the gauge `box`.
+    norms = tuple(norm for norm in NORMS if norm in minimised and (norm == 2 or not sketch.orthogonal))
+    recipes = []
+    for size, seed, gauge in product(sketch.sizes_on(rung), sketch.all_seeds, rung.gauges):
+        sized = f"f{size:04}" if sketch.orthogonal else f"n{size:03}"
+        seeded = "" if seed is None else f"_s{seed}"
+        name = f"cf_{sketch.name}_{sized}{seeded}{'_box' if gauge == 'box' else ''}"
+        prove = norms if gauge == "strokes" else ()
+        recipe = InstanceRecipe(name, sketch, rung.name, size, seed, gauge, prove)
+        recipes.append(replace(recipe, entries=_entries(recipe, rung, formulations)))
+    return recipes
 
 
 def _entries(recipe: InstanceRecipe, rung: Rung, formulations: tuple[str, ...]) -> tuple[EntryRecipe, ...]:

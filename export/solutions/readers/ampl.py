@@ -45,8 +45,8 @@ from ....models.instance.domain import Floats
 from ....models.storage import replacing
 from ...statuses import status_of_ampl
 from ...writing.stamps import digits_of_option, stamp_option
-from .grammar import HEAD, EntryForm, place_of_entry, quoted
-from .text import Cursor, RawSolution, Reader, line_error, one_line, read_entries, starts_with
+from .grammar import HEAD, EntryForm, line_error, place_of_entry, quoted
+from .text import Cursor, RawSolution, Reader, one_line, read_entries, starts_with
 
 _OPTIONS = re.compile(rb"^Options[ \t]*\n", re.MULTILINE)
 _OBJNO = re.compile(rb"^objno\b.*", re.MULTILINE)
@@ -271,5 +271,5 @@ def _text_parts(message: str, primal: Floats, numbers: tuple[int, ...], code: in
     yield f"objno 0 {code}\n".encode()
 
 
-BINARY: Final = Reader("ampl-binary", "AMPL .sol, binary", starts_with(_MAGIC), parse_binary, text=False)
+BINARY: Final = Reader("ampl-binary", "AMPL .sol, binary", starts_with(_MAGIC), parse_binary)
 TEXT: Final = Reader("ampl-text", "AMPL .sol, text", _recognises_text, parse_text)

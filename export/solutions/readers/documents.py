@@ -230,7 +230,7 @@ READERS: Final = (
     Reader(
         "json",
         "JSON of PuLP or Pyomo, or of names and values",
-        starts_with(rb"\s*(?:\{(?!\s*(?:\"SolutionInfo\"|'))|\[\s*\{)"),
+        starts_with(rb'\s*(?:\{\s*(?:"(?!SolutionInfo")|\}|\Z)|\[\s*\{)'),  # others begin a message of AMPL
         parse_document,
     ),
 )

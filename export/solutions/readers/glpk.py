@@ -26,8 +26,8 @@ from ....models.errors import SolutionError
 from ....models.instance.domain import Floats
 from ...statuses import Status, claim_of
 from ...writing.canonical import ColumnOrder
-from .grammar import EntryForm, place_of_entry, quoted
-from .text import Cursor, RawSolution, Reader, line_error, read_entries, solution_without_point
+from .grammar import EntryForm, line_error, place_of_entry, quoted
+from .text import Cursor, RawSolution, Reader, read_entries, solution_without_point
 
 _SUMMARY = re.compile(rb"s (mip|bas|ipt) (\d{1,12}) (\d{1,12}) (.+) (\S+)")
 _END: Final = b"e o f"

@@ -8,7 +8,6 @@ that are no entries are processed one by one.
 
 from __future__ import annotations
 
-import codecs
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -16,6 +15,8 @@ from functools import cache
 from itertools import compress, count
 from math import isclose
 from operator import le
+
+from ....models.errors import SolutionError
 
 TOKEN_LIMIT = 63
 """Longest name or number, in bytes. Names of crossfield have at most 15, numbers at most 24."""
@@ -46,7 +47,7 @@ CLAIMS = (
 """Lines that state an objective or a status in every layout, with or without a mark of a comment."""
 
 AGREEMENT = 1e-5
-"""Largest difference of two statements of the same objective: CBC writes eight digits."""
+"""Largest difference of two objectives that agree, relative to their size, or 1: CBC writes eight digits."""
 
 NUMBERS = frozenset({"objective", "bound"})
 NO_NUMBERS = frozenset({b"NA", b"UNDF", b"NONE"})
@@ -56,24 +57,12 @@ RESERVED = rb"[#=]|obj(?:ective)?(?:[ _]value)?[\s=:]"
 """Start of a line that is no entry."""
 
 
-class LineError(Exception):
-    """A fault of a text, with its line if it has one."""
+AGAIN = "let the solver write the file again"
 
 
-def error_at(data: bytes, position: int, text: str) -> LineError:
-    """An error with the line of a byte position in a text."""
-    return LineError(f"line {data.count(10, 0, position) + 1}: {text}")
-
-
-def plain_text(data: bytes) -> bytes:
-    r"""The text in UTF-8 without a byte order mark, with \n at the end of its lines. Raises LineError."""
-    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        try:
-            data = data.decode("utf-16").encode()
-        except UnicodeError:
-            raise LineError("the text in UTF-16 is damaged or cut off; save it again") from None
-    data = data.removeprefix(codecs.BOM_UTF8)
-    return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
+def line_error(data: bytes, position: int, text: str, remedy: str = f"; {AGAIN}") -> SolutionError:
+    """An error with the line of a byte position in a text, and the remedy."""
+    return SolutionError(f"line {data.count(10, 0, position) + 1}: {text}{remedy}")
 
 
 def is_number(word: bytes) -> bool:
@@ -282,7 +271,7 @@ class Scan:
         self.cut = b""
 
     def read(self) -> Iterator[tuple[list[bytes], list[bytes]]]:
-        """Names and values of all lists, piece by piece. Raises LineError."""
+        """Names and values of all lists, piece by piece. Raises SolutionError."""
         at, inside = 0, not self.layout.begin
         while at < len(self.data):
             if inside and self._chooses_form(at):
@@ -316,7 +305,7 @@ class Scan:
             self.restarts += len(again)
             if self.restarts > 1:
                 place = place_of_entry(self.data, start, again[-1])
-                raise error_at(self.data, place, "the numbers start again for the second time")
+                raise line_error(self.data, place, "the numbers start again for the second time")
             self.first = self.entries + again[0] if again else self.first
             self.last_index = index[-1]
         self.entries += len(names)
@@ -339,7 +328,7 @@ class Scan:
             if match is None or key == ("begin" if self.begun else "end"):
                 continue
             if key.startswith("refusal"):
-                raise error_at(data, at, self.layout.refusals[int(key[8:])][1])
+                raise line_error(data, at, self.layout.refusals[int(key[8:])][1], "")
             self._keep(match)
             if key == "end":
                 self.ended = True
@@ -351,8 +340,8 @@ class Scan:
         if self._is_other_text(at):
             return len(data), False
         if self.unended and end + 1 == len(data):
-            raise error_at(data, at, "the file is cut off in the middle of this line")
-        raise error_at(data, at, self.form.fault(data[at:end]))
+            raise line_error(data, at, "the file is cut off in the middle of this line")
+        raise line_error(data, at, self.form.fault(data[at:end]))
 
     def _is_other_text(self, at: int) -> bool:
         """Whether the text from a line on is no part of the answer: after an empty line, without entries."""
@@ -368,13 +357,13 @@ class Scan:
             if group in NUMBERS and not is_number(text):
                 if text.upper() in NO_NUMBERS:
                     continue
-                raise error_at(self.data, match.start(group), f"{quoted(text)} is not a number")
+                raise line_error(self.data, match.start(group), f"{quoted(text)} is not a number")
             before = self.claims.setdefault(group, text)
             if group == "objective" and not isclose(
                 float_of(before), float_of(text), rel_tol=AGREEMENT, abs_tol=AGREEMENT
             ):
                 line = self.data.count(10, 0, place) + 1
-                raise error_at(self.data, match.start(group), f"this is not the objective of line {line}")
+                raise line_error(self.data, match.start(group), f"this is not the objective of line {line}")
 
     def _check(self) -> None:
         """Refuse a text whose counts or marks show that it is not whole."""
@@ -382,17 +371,17 @@ class Scan:
             text, place = self.claims["count"], self.places["count"]
             if not re.fullmatch(rb"-?\d{1,12}", text):
                 line = self.data[self.data.rfind(b"\n", 0, place) + 1 : self.data.index(b"\n", place)]
-                raise error_at(self.data, place, f"{quoted(line)} is not the number of columns")
+                raise line_error(self.data, place, f"{quoted(line)} is not the number of columns")
             announced, held = abs(int(text)), self.entries - bool(self.cut)
             self.sparse = text.startswith(b"-") or "sparse" in self.claims or not announced
             if held != announced:
                 words = f"{announced} columns are announced, {held} whole lines follow"
-                raise error_at(self.data, place, words)
+                raise line_error(self.data, place, words)
         none = {"none", "infeasible"} & set(self.claims)
         for group, missing in () if none else self.layout.needs:
             marks = {"end": self.ended or not self.begun, "begin": self.begun}
             if not marks.get(group, group in self.places):
-                raise LineError(f"the file is cut off: it has no {missing}")
+                raise SolutionError(f"the file is cut off: it has no {missing}; {AGAIN}")
 
     @property
     def status(self) -> str:

@@ -53,7 +53,12 @@ SCIP = TextLayout(
     ),
     forms=("name value word", "name value"),
     claims=(rb"solution status:\s*(?P<status>.*?)", rb"(?P<none>no solution available)"),
-    refusals=((rb"objective value:\s+unknown", "this is a partial solution, with columns of unknown value"),),
+    refusals=(
+        (
+            rb"objective value:\s+unknown",
+            "this is a partial solution, with columns of unknown value; let the solver write the file again",
+        ),
+    ),
     needs=(("objective", "objective"),),
     omits_zeros=True,
     silent="SCIP's command `write solution` states it; --bound X states the dual bound (getDualbound)",
@@ -143,6 +148,44 @@ EPS is a zero, +INF and -INF occur, NA and UNDF are not values. GAMS's numbers o
 manual under modelStat and solveStat. If the model status promises no point, GAMS keeps the start in the
 levels: values are then not read. A listing (.lst) has four decimals, too few for a point, and is not read."""
 
+BARON = TextLayout(
+    "baron-res",
+    "BARON results (res.lst)",
+    signature=rb"\A\s*=+\n\s*BARON version ",
+    forms=("name number value number",),
+    claims=(
+        rb"\*\*\* (?P<status>[^*\n]{3,100}?) \*\*\*",
+        rb"eps(?:a +=\s+(?P<epsa>%b)|r +=\s+(?P<epsr>%b))" % (NUMBER, NUMBER),
+        rb"(?P<early>first(?:feas|loc) +=\s+1|deltaterm +=\s+1|target +=(?!\s+-0\.1000E\+52).*)",
+        rb">>> (?P<point>Objective value is):.*",
+    ),
+    begin=rb"The best solution found is:?[ \t]*\n\s*variable\b.*",
+    end=rb"The above solution has an objective value of:\s+(?:(?P<none>-?[\d.]+E\+0?5\d)|(?P<objective>\S+))",
+    needs=(("status", "end of the search"), ("end", "objective")),
+    refusals=(
+        (
+            rb"Best solution found at node:.*",
+            "this is the summary of BARON, which holds no values; give its results, res.lst",
+        ),
+    ),
+    rewrites=((b"unbounded ray:", rb"(?<=objective value of:).*", b" -1E+51"),),
+)
+"""As BARON 26.5.27 writes it (codes: BARON.jl and Pyomo's reader):
+
+    ...                                      log of all points found, by number; not read
+                *** Normal completion ***    how the search ended
+    The best solution found is:
+
+      variable        xlo     xbest    xup
+      x               0       10       10    name, lower bound, value, upper bound, until an empty line
+
+    The above solution has an objective value of:  -14.4
+
+Normal completion proves an optimum within the gaps that the file states, infeasibility without a table,
+unboundedness when a ray follows it. It proves nothing when an option may have ended the search earlier
+(FirstFeas, FirstLoc, DeltaTerm, Target): then the point counts as feasible. sum.lst begins like res.lst and
+has no values: it is refused."""
+
 MIPLIB = TextLayout(
     "miplib",
     "MIPLIB .sol",
@@ -181,5 +224,5 @@ LIST = TextLayout(
 There is no status: the point counts as feasible. A MIP start (.mst) looks like one, and Gurobi's holds only
 the integer columns. Layout: Gurobi 13.0.3."""
 
-LAYOUTS = (HIGHS, SCIP, XPRESS, CBC, GAMS, MIPLIB, LIST)
+LAYOUTS = (HIGHS, SCIP, XPRESS, CBC, GAMS, BARON, MIPLIB, LIST)
 """The first whose signature is found has the text; a plain list has none, and is last."""

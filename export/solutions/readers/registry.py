@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -13,28 +14,50 @@ from ....models.errors import InputError, SolutionError, naming
 from ....models.input_limits import MAX_SOLUTION
 from ....models.packed import unpack, unpack_start
 from ....models.storage import read_bytes
+from ....models.text_rows import plain_text
 from ...statuses import Status, claim_of, status_of_gams
 from ...writing.stamps import digits_in_columns, digits_in_text
-from . import ampl, baron, cplex, documents, glpk
-from .grammar import HEAD, Scan, error_at, plain_text
+from . import ampl, cplex, documents, glpk
+from .grammar import HEAD, Scan, float_of, line_error
 from .listings import TEXT_LAYOUTS
 from .siblings import log_of, sibling_of
-from .text import Claim, RawSolution, Reader, choose_solution, reader_of, refuse_faults
+from .text import Claim, RawSolution, Reader, choose_solution, one_line, reader_of
 
 _NEAR_ONE: Final = 1e-5
+_BANNER: Final = re.compile(rb"^ *\*\*\* ([^*\n]{3,100}?) \*\*\* *$", re.MULTILINE)
+"""How a search of BARON ended; the last one counts."""
 _SMALLER: Final = "let the solver write it without columns at 0"
 
 
 def _claim_of_highs(scan: Scan) -> tuple[Status, str]:
     status, words = claim_of(scan.status, "highs")
     if status.is_optimal and "none" in scan.claims:
-        raise error_at(scan.data, scan.places["none"], "the file is Optimal but holds no point")
+        raise line_error(scan.data, scan.places["none"], "the file is Optimal but holds no point")
     denied = scan.claims.get("primal", b"").lower() not in {b"feasible", b""}
     return status.without_point if denied else status, words
 
 
 def _claim_of_gams(scan: Scan) -> tuple[Status, str]:
     return status_of_gams(int(scan.status), int(scan.claims["solver"]))
+
+
+def _claim_of_baron(scan: Scan) -> tuple[Status, str]:
+    *_, last = _BANNER.findall(scan.data)
+    status, words = claim_of(one_line(last), "baron-res")
+    if not scan.begun and "point" in scan.claims:
+        raise SolutionError("the file is cut off: points were found, and the table of the best is not there")
+    if not status.is_optimal:
+        return status if scan.begun else status.without_point, words
+    if not scan.begun:
+        return Status.INFEASIBLE, words
+    if "none" in scan.claims:
+        return Status.UNBOUNDED, words
+    if "early" in scan.claims:
+        return Status.FEASIBLE, words
+    if {"epsa", "epsr"} <= scan.claims.keys():
+        objective, *gaps = (float_of(scan.claims[group]) for group in ("objective", "epsa", "epsr"))
+        scan.claims["bound"] = repr(objective - max(gaps[0], gaps[1] * abs(objective))).encode()
+    return status, words
 
 
 def _claim_by(*layouts: str) -> Claim:
@@ -47,6 +70,7 @@ _SILENT: Final = Status.FEASIBLE, ""
 _CLAIMS: Final[dict[str, Claim]] = {
     "highs": _claim_of_highs,
     "gams-csv": _claim_of_gams,
+    "baron-res": _claim_of_baron,
     "gams-listing": _claim_of_gams,
     "scip": _claim_by("scip"),
     "cbc": _claim_by("cbc"),
@@ -64,7 +88,6 @@ READERS: Final[tuple[Reader, ...]] = (
     *documents.READERS,
     cplex.READER,
     glpk.READER,
-    baron.READER,
     *_LISTS[: -len(PLAIN)],
     ampl.TEXT,
     *PLAIN,
@@ -90,8 +113,7 @@ def parse_raw(data: bytes, solution: int | None = None) -> RawSolution:
     if not data or data.isspace():
         raise SolutionError("the file is empty; the solver's log should give the reason")
     binary = ampl.BINARY.recognises(data[:HEAD])
-    with refuse_faults():
-        text = data if binary else plain_text(data)
+    text = data if binary else plain_text(data, SolutionError)
     head, readers = text[:HEAD], recognising_readers(text)
     if not readers:
         known = "; ".join(reader.description for reader in READERS)
@@ -139,6 +161,6 @@ def _stated_stamps(head: bytes, raw: RawSolution) -> frozenset[str]:
 
 def head_of(data: bytes) -> bytes:
     """The first bytes of a file, unpacked, as `plain_text` returns them; as they are if they are damaged."""
-    with suppress(InputError, SolutionError), refuse_faults():
+    with suppress(InputError):
         return plain_text(unpack_start(data, HEAD))
     return data[:HEAD]

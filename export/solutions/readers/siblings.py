@@ -6,10 +6,24 @@ import re
 from typing import Final
 
 _COMMENTS: Final = rb"\A(?:[ \t]*(?:%b[^\n]*)?\n)*[ \t]*"
-_MODEL: Final = "this is the model file ({}); solve it, and give the file that the solver writes"
+_MODEL: Final = "this is a model file; solve it, and give the file that the solver writes"
 _BASIS: Final = "this is a basis file, which states the columns at their bounds and no values; {}"
 _REPORT: Final = "this is {}, with too few digits for a point; {}"
 _OURS: Final = "this is {} of crossfield and no answer; give the file that the solver writes"
+
+_MODELS: Final = (
+    _COMMENTS % rb"\\" + rb"(?i:minimi[sz]e|maximi[sz]e|minimum|maximum|min|max)\b[^\n]*\n",  # LP
+    _COMMENTS % rb"\*"
+    + rb"(?:NAME\b[^\n]*\n\s*)?(?:OBJSENSE\b[^\n]*\n\s*(?:MIN|MAX)\w*\s*\n\s*)?(?:ROWS\b|SETS\b)",  # MPS
+    rb"\A[gb]\d+ +\d+ +\d+[ \d]*\s",  # .nl
+    _COMMENTS % rb"\*" + rb"\$(?i:off|on)\w+|^(?i:solve +\w+ +using)\b",  # GAMS
+    rb"<osil\b",
+    rb"\A[^\n]*\n[ \t]*[LDCQ][CBMIG][NBLDCQ]\b[^\n]*\n[ \t]*(?i:min|max)",  # QPLIB
+    _COMMENTS % rb"//" + rb"(?:(?:BINARY_|INTEGER_|POSITIVE_)?VARIABLES?\b|OPTIONS\s*\{)",  # .bar
+    _COMMENTS % rb"#" + rb"(?:set|param|var|data|model|minimize|maximize)\b[^\n]*[;:={]",  # AMPL
+    rb"\A(?:c[^\n]*\n)*p (?:lp|mip) (?:min|max) ",  # GLPK
+)
+"""Patterns of the starts of model files."""
 
 SIBLINGS: Final[tuple[tuple[bytes, str], ...]] = (
     (
@@ -50,28 +64,7 @@ SIBLINGS: Final[tuple[tuple[bytes, str], ...]] = (
     ),
     (rb"\AHiGHS_basis_file", _BASIS.format("write the solution with HiGHS's option solution_file")),
     (rb"<CPLEXBasis|<basis\b", _BASIS.format("write the answer with `write FILE.sol`")),
-    (
-        _COMMENTS % rb"\\" + rb"(?i:minimi[sz]e|maximi[sz]e|minimum|maximum|min|max)\b[^\n]*\n",
-        _MODEL.format("LP"),
-    ),
-    (
-        _COMMENTS % rb"\*"
-        + rb"(?:NAME\b[^\n]*\n\s*)?(?:OBJSENSE\b[^\n]*\n\s*(?:MIN|MAX)\w*\s*\n\s*)?(?:ROWS\b|SETS\b)",
-        _MODEL.format("MPS"),
-    ),
-    (rb"\A[gb]\d+ +\d+ +\d+[ \d]*\s", _MODEL.format(".nl")),
-    (_COMMENTS % rb"\*" + rb"\$(?i:off|on)\w+|^(?i:solve +\w+ +using)\b", _MODEL.format("GAMS")),
-    (rb"<osil\b", _MODEL.format("OSiL")),
-    (rb"\A[^\n]*\n[ \t]*[LDCQ][CBMIG][NBLDCQ]\b[^\n]*\n[ \t]*(?i:min|max)", _MODEL.format("QPLIB")),
-    (
-        _COMMENTS % rb"//" + rb"(?:(?:BINARY_|INTEGER_|POSITIVE_)?VARIABLES?\b|OPTIONS\s*\{)",
-        _MODEL.format(".bar"),
-    ),
-    (
-        _COMMENTS % rb"#" + rb"(?:set|param|var|data|model|minimize|maximize)\b[^\n]*[;:={]",
-        _MODEL.format("AMPL"),
-    ),
-    (rb"\A(?:c[^\n]*\n)*p (?:lp|mip) (?:min|max) ", _MODEL.format("GLPK")),
+    *((pattern, _MODEL) for pattern in _MODELS),
     (
         (
             rb"\A(?:(?:#[^\n]*)?\n)*(?:[A-Z][A-Za-z]+[ \t]+\S+\n)*?"
@@ -101,18 +94,13 @@ SIBLINGS: Final[tuple[tuple[bytes, str], ...]] = (
 _PATTERNS: Final = tuple((re.compile(pattern, re.MULTILINE), words) for pattern, words in SIBLINGS)
 
 
-_LOGS: Final = {
-    title: re.compile(start, re.MULTILINE)
-    for title, start in (
-        ("BARON", rb"^ *BARON version \d"),
-        ("HiGHS", rb"^(?:Running HiGHS |(?:LP|QP|MIP|MIQP)\b.* has \d+ rows; \d+ cols; )"),
-        ("Gurobi", rb"^Gurobi Optimizer version "),
-        ("SCIP", rb"^(?:SCIP version |original problem has \d+ variables)"),
-        ("Xpress", rb"^FICO Xpress .*v\d"),
-        ("CPLEX", rb"^(?:Version identifier: \d|Welcome to IBM.*CPLEX|--- GAMS/CPLEX|IBM ILOG CPLEX)"),
-    )
-}
-"""Starts of logs by solver. The first match counts: BARON and GAMS name the solvers that they call."""
+_LOG: Final = re.compile(
+    rb"^ *BARON version \d|^Running HiGHS |^(?:LP|QP|MIP|MIQP)\b.* has \d+ rows; \d+ cols; "
+    rb"|^Gurobi Optimizer version |^SCIP version |^original problem has \d+ variables|^FICO Xpress .*v\d"
+    rb"|^Version identifier: \d|^Welcome to IBM.*CPLEX|^--- GAMS/CPLEX|^IBM ILOG CPLEX",
+    re.MULTILINE,
+)
+"""Starts of logs of BARON, HiGHS, Gurobi, SCIP, Xpress and CPLEX."""
 
 
 def sibling_of(head: bytes) -> str:
@@ -122,7 +110,5 @@ def sibling_of(head: bytes) -> str:
 
 def log_of(head: bytes) -> str:
     """Kind of a file that is a solver's log, by its first bytes, with the remedy; else empty."""
-    title = next((title for title, start in _LOGS.items() if start.search(head)), "")
-    return title and (
-        f"this is a log of {title}, which holds no point; give the solution file that the run wrote"
-    )
+    words = "this is a log of a solver, which holds no point; give the solution file that the run wrote"
+    return words if _LOG.search(head) else ""

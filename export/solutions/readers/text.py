@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import repeat
@@ -17,15 +16,15 @@ from ....models.errors import SolutionError
 from ....models.instance.domain import Floats, Ints
 from ...statuses import Status
 from .grammar import (
+    AGAIN,
     HEAD,
     TOKEN_LIMIT,
     EntryForm,
-    LineError,
     Scan,
     TextLayout,
-    error_at,
     float_of,
     is_number,
+    line_error,
     plain_numbers,
     quoted,
     spellings,
@@ -65,7 +64,7 @@ class RawSolution:
     of rows, whose values are left out.
     stamps: digits of the problem's stamp, or the first of them, wherever the solver repeated it. reader: name
     of the reader of the file.
-    rounded: how the program writes all digits, if it rounded them, or empty. silent: how it writes its
+    digits: how the program writes all digits, if it rounded them, or empty. silent: how it writes its
     status, if its layout has none, or empty. pool: all solutions of a file
     that holds several, in its order.
     """
@@ -82,7 +81,7 @@ class RawSolution:
     row_names: Bytes | None = None
     stamps: frozenset[str] = frozenset()
     reader: str = ""
-    rounded: str = ""
+    digits: str = ""
     silent: str = ""
     pool: tuple[RawSolution, ...] = ()
 
@@ -132,14 +131,13 @@ class Reader:
     """A reader of one kind of file.
 
     recognises: whether a file with these first bytes is of this kind. parse: reads a whole file. Raises
-    SolutionError. text: both receive lines that end as on Unix.
+    SolutionError.
     """
 
     name: str
     description: str
     recognises: Callable[[bytes], bool]
     parse: Callable[[bytes], RawSolution]
-    text: bool = True
 
 
 def starts_with(pattern: bytes) -> Callable[[bytes], bool]:
@@ -156,8 +154,7 @@ def reader_of(layout: TextLayout, claim: Claim) -> Reader:
 
 
 def _parse_layout(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
-    with refuse_faults():
-        return solution_pool([_parse_answer(answer, layout, claim) for answer in layout.answers(data)])
+    return solution_pool([_parse_answer(answer, layout, claim) for answer in layout.answers(data)])
 
 
 def _parse_answer(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
@@ -180,7 +177,7 @@ def _parse_answer(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
         rows=int(rows) if re.fullmatch(rb"\d{1,12}", rows) else None,
         bound=bound if bound is not None and np.isfinite(bound) else None,
         row_names=names[:first] if first else None,
-        rounded=layout.digits,
+        digits=layout.digits,
         silent=layout.silent,
     )
 
@@ -192,12 +189,12 @@ def _note(scan: Scan) -> str:
 
 
 def _without_point(scan: Scan, status: Status, words: str) -> RawSolution:
-    """The content of a text without a point. Raises LineError when it must have one."""
+    """The content of a text without a point. Raises SolutionError when it must have one."""
     silent = "status" not in scan.claims
     if "infeasible" in scan.claims:
         return solution_without_point(Status.INFEASIBLE, words or scan.claims["infeasible"])
     if not {"none", "status"} & set(scan.claims) or (status.needs_point and "none" not in scan.claims):
-        raise LineError("the file holds no values")
+        raise SolutionError(f"the file holds no values; {AGAIN}")
     return solution_without_point(
         Status.NO_POINT if silent or status is Status.FEASIBLE else status.without_point,
         words or scan.claims.get("none", b""),
@@ -206,16 +203,6 @@ def _without_point(scan: Scan, status: Status, words: str) -> RawSolution:
 
 def _number(scan: Scan, group: str) -> float | None:
     return float_of(scan.claims[group]) if group in scan.claims else None
-
-
-@contextmanager
-def refuse_faults() -> Iterator[None]:
-    """Raise SolutionError with a remedy for a fault of the text."""
-    try:
-        yield
-    except LineError as error:
-        remedy = "" if ";" in str(error) else "; let the solver write the file again"
-        raise SolutionError(f"{error}{remedy}") from None
 
 
 class Entries(NamedTuple):
@@ -345,14 +332,9 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
     _check_point(raw)
     count = raw.values.size
     if (raw.rows, count) != (rows, columns):
-        if raw.order != "nl" and (raw.rows, count) == (rows + 1, columns):
-            raise SolutionError(
-                "the file counts one row too many: this is HiGHS style 2 (GLPK raw); "
-                "write it with write_solution_style = 0 (raw) or 4 (sparse)"
-            )
         raise SolutionError(
             f"the file is of {count} columns and {raw.rows} rows, the problem has {columns} columns and "
-            f"{rows} rows; give the solution of this problem"
+            f"{rows} rows; give the solution of this problem, of HiGHS in style 0 (raw) or 4 (sparse)"
         )
     return raw.values.copy()
 
@@ -360,11 +342,6 @@ def values_in_order(columns: int, rows: int, raw: RawSolution) -> Floats:
 def one_line(text: bytes) -> str:
     """The words of a text on one line of at most 300 characters, without control characters."""
     return " ".join(_CONTROLS.sub(" ", text[:HEAD].decode(errors="replace")).split())[:300]
-
-
-def line_error(data: bytes, position: int, text: str) -> SolutionError:
-    """An error with the line of a byte position in a text, and the remedy."""
-    return SolutionError(f"{error_at(data, position, text)}; let the solver write the file again")
 
 
 @dataclass
@@ -390,13 +367,6 @@ class Cursor:
             self.before, self.position = self.position, len(self.data) if end < 0 else end + 1
             line = self.data[self.before : self.position].strip()
         return line
-
-    def after(self, label: bytes, expected: str) -> bytes:
-        """The text after a label on the next line, stripped. Raises SolutionError for another label."""
-        line = self.line(expected)
-        if not line.startswith(label):
-            raise self.fault(f"{quoted(line)} stands where {expected} should")
-        return line.removeprefix(label).strip()
 
     def count(self, expected: str) -> int:
         """The next line as an integer that is not negative. Raises SolutionError."""

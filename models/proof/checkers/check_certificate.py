@@ -1108,7 +1108,7 @@ def pieces_of(terms: EnergyTerms, step: LastStep, cuts: list[int]) -> Iterator[B
     numbers, n = iter(cuts), len(terms.white)
     waiting: list[Callable[[], BoxPiece]] = [lambda: step.whole_piece] if cuts else []  # made when needed
     for at in numbers:
-        require(waiting, "cuts", "has a piece too many")
+        require(bool(waiting), "cuts", "has a piece too many")
         require(-1 <= at < n + len(terms.first), "cuts", "is no pixel and no pair")
         piece = waiting.pop()()
         if at >= n:

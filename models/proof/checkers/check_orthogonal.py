@@ -26,7 +26,7 @@ try:
 except ImportError:  # run as a program
     import check_certificate as base  # type: ignore[import-not-found,no-redef]
 
-FORMAT, VERSION = "crossfield-orthogonal-certificate", 2
+FORMAT, VERSION = "crossfield-orthogonal-certificate", 3
 HALF, QUARTER, MARGIN = base.HALF, base.QUARTER, base.ROUNDING * base.PRECISION
 min_plus = base.min_plus_product
 RELATIVE = 1e-9
@@ -34,15 +34,17 @@ FLAT = 1e-8  # radians; instances take smaller turns between frames as 0
 MOST_LEVELS, MOST_DIVISIONS = 64, 10_000  # of a certificate; cells of a quarter turn
 STRIDE = 4 * MOST_DIVISIONS  # between keys of labels of two points
 MOST_MEMORY = 1 << 33  # bytes for a level, of whatever file
-MORE_ROOM = 1 << 11  # bytes of memory for each byte of a file: more than for other crosses
+MORE_ROOM = 1 << 13  # bytes of memory for each byte of a file: more than for other crosses
 MOST_WORK = 8  # times as much memory for all levels together, if each had its own
 MOST_RING = 64  # pairs of a ring
 MOST_TABLES = 1 << 22  # of a level: sums of so many 32-bit numbers are exact in 64-bit floats
-MOST_FORESTS = 8  # of a level
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
+MOST_STAGES = 64  # of charges
+BLOCK = 1 << 19  # of links from their clouds at once
 MOST_CASES = 256  # of integers after the last level
 MOST_ANGLE = 1e3  # of a centre and of the angles of a case
-FARTHEST, THINNEST = 1e30, 1e-12  # coordinates; height of a face relative to its longest edge
+FARTHEST = 1e30  # coordinates, potentials and prices
+THINNEST = 1e-12  # height of a face relative to its longest edge
 DECIMALS = 12  # of kappa
 TURNS = np.arange(-3, 4)  # by which an integer may differ from that of the centre
 CENTRAL = TURNS == 0
@@ -54,7 +56,12 @@ PARTS = (
 OF_MESH = ("instance_vertices", "instance_faces", "instance_stroke_faces", "kappa")
 OF_GRID = ("instance_origin", "instance_mask", "instance_stroke_pixels")
 WEIGHTS = "instance_pair_weights"  # also, unless all are 1
-LEVEL_PARTS = ("rings", "shares", "unit", "forests", "squares")
+LOOPS = ("loop_start", "loop_row", "loop_sign", "stages")  # also, or none of them
+STAGE_PARTS = {  # of charges, with their kinds; the first four have a number for each loop
+    "positive": "|u1", "negative": "|u1", "potential": "<f8", "price": "<f8",
+    "start": "<i4", "loop": "<i4", "weight": "<f4",
+}  # fmt: skip
+LEVEL_PARTS = ("rings", "shares", "unit", "squares")
 
 Array = Any
 Ring = tuple[list[int], list[int], list[int]]
@@ -180,13 +187,16 @@ def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring
     sign = base.take_array(arrays, "ring_sign", "|i1", int(start[-1]))
     base.require((pair >= 0) & (pair < len(first)) & (np.abs(sign) == 1), "ring_pair", "is no pair")
     begin, end = np.where(sign > 0, [first[pair], second[pair]], [second[pair], first[pair]])
-    rings: list[Ring] = []
-    for a, b in zip(start[:-1].tolist(), start[1:].tolist()):
-        differ = all(len(set(part[a:b].tolist())) == b - a for part in (begin, pair))
-        closed = (np.roll(begin[a:b], -1) == end[a:b]).all() and differ
-        base.require(closed, f"ring {len(rings)}", "is no closed walk over different points and pairs")
-        rings.append((pair[a:b].tolist(), sign[a:b].tolist(), begin[a:b].tolist()))
-    return rings
+    ring, following = np.repeat(np.arange(len(steps)), steps), np.roll(np.arange(len(pair)), -1)
+    following[start[1:] - 1] = start[:-1]
+    closed = begin[following] == end
+    for numbers in (begin, pair):
+        _, once = np.unique(ring * (numbers.max(initial=0) + 1) + numbers, return_index=True)
+        closed &= np.isin(np.arange(len(pair)), once)
+    wrong = "is no closed walk over different points and pairs"
+    base.require(np.bincount(ring, ~closed, len(steps)) == 0, "ring", wrong)
+    parts = [[part.tolist() for part in np.split(array, start[1:-1])] for array in (pair, sign, begin)]
+    return list(zip(*parts)) if len(steps) else []
 
 
 def limits_of(rows: CentredRows) -> Array:
@@ -404,41 +414,16 @@ class Excess:
         marginals = zip([steps[0] + after[0].T, *middle, steps[-1] + before[-1].T], ring[1])
         return [(marginal if sign > 0 else marginal.T) - least for marginal, sign in marginals]
 
-    def forest_marginals(self, forest: list[int], spare: float) -> Array:
-        """Of each label, the least sum of excesses on a forest; the pairs of a tree grow from one of them.
-
-        Labels with a sum above `spare` are excluded on the way. So no difference of great numbers is taken.
-        """
-        edges, reached, pairs = list[tuple[int, int, Array]](), set[int](), self.level.pairs
-        up, message = list(self.by_point), dict[int, Array]()
-        for e in forest:
-            i, j = self.level.rows.ends[e]
-            child, parent = (j, i) if i in reached else (i, j)
-            base.require(child not in reached, "forests", "has a cycle")
-            reached |= {i, j}
-            matrix = pairs.matrix(self.pairs, e)
-            edges.append((child, parent, matrix if child == i else matrix.T))
-        for i, parent, matrix in reversed(edges):
-            message[i] = (matrix + up[i][:, None]).min(axis=0)
-            up[parent] = up[parent] + message[i]
-        whole = list(up)
-        for i, parent, matrix in edges:
-            rest = np.full(len(whole[parent]), np.inf)  # without i
-            np.subtract(whole[parent], message[i], out=rest, where=whole[parent] <= spare)
-            whole[i] = up[i] + (matrix + rest).min(axis=1)
-        return np.concatenate(whole)
-
 
 def greatest(numbers: Array, start: Array) -> Array:
     """The greatest absolute value of finite numbers in each block."""
     return np.maximum.reduceat(np.where(np.isfinite(numbers), np.abs(numbers), 0.0), start[:-1])
 
 
-def kept_of(level: CellLevel, excess: Excess, forests: Array, most: float) -> Array:
+def kept_of(level: CellLevel, excess: Excess, most: float) -> Array:
     """Lemma 4: the squares that an optimal field of energy `most` or less may use."""
     spare = (most - excess.bound + 2 * excess.error) * (1 + RELATIVE)
-    marginals = [excess.forest_marginals(forest.tolist(), spare) for forest in forests]
-    labels = np.maximum.reduce([excess.points, *marginals]) <= spare
+    labels = excess.points <= spare
     pairs = np.add(*level.pairs.at_ends(np.where(labels, excess.points, np.inf))) + excess.pairs <= spare
     labels &= level.pairs.have_partners(pairs)
     left = [np.nonzero(kept)[0] for kept in np.split(labels, level.pairs.start[1:-1])]
@@ -467,8 +452,9 @@ def possible_turns(level: CellLevel, squares: Array) -> Array:
 
 def cases_of(turns: Array) -> list[tuple[int, ...]]:
     """All choices of one turn for each row; none if there are too many."""
-    choices = [TURNS[of_row] for of_row in turns]
-    return list(itertools.product(*choices)) if math.prod(map(len, choices)) <= MOST_CASES else []
+    if np.log2(np.maximum(turns.sum(axis=1), 1)).sum() > math.log2(MOST_CASES) + RELATIVE:
+        return []
+    return list(itertools.product(*(TURNS[of_row] for of_row in turns)))
 
 
 def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
@@ -487,6 +473,175 @@ def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
     return min(bounds)
 
 
+# Section 5: charges ----------------------------------------------------------------------------------------
+
+
+class Charges:
+    """Loops, which are closed walks over rows, and their charges: sums of residuals, in quarter turns.
+
+    origin (l,): f, the possible charge nearest 0, negated. most (2, l): how many positive and negative
+    particles an optimal field has there at most. resistance (l,), begin, column, entry: the Laplacian; its
+    entries off the diagonal, negated, line by line. closed (l,): whether a loop shares all its rows. margin:
+    relative error of sums over rows. error: of each charge.
+    """
+
+    def __init__(self, arrays: dict[str, Array], rows: CentredRows) -> None:
+        start = base.take_array(arrays, "loop_start", "<i4", None).astype(np.int64)
+        base.require(len(start) and start[0] == 0, "loop_start", "does not begin with 0")
+        base.require(np.diff(start) > 0, "loop_start", "does not increase")
+        row = base.take_array(arrays, "loop_row", "<i4", int(start[-1])).astype(np.int64)
+        sign = base.take_array(arrays, "loop_sign", "|i1", int(start[-1])).astype(np.int64)
+        n, count, self.size, self.rows = rows.size, len(rows.first), len(start) - 1, rows
+        base.require((row >= 0) & (row < count) & (np.abs(sign) == 1), "loop_row", "is no row")
+        base.require(rows.weight[row] >= RELATIVE, "loop_row", "has too little weight")
+        loop = np.repeat(np.arange(self.size), np.diff(start))
+        base.require(len(np.unique(loop * count + row)) == len(row), "loops", "pass a row twice")
+        uses, both = np.bincount(row, minlength=count), np.bincount(row, sign, count)
+        base.require((uses < 2) | ((uses == 2) & (both == 0)), "loops", "pass a row twice in one direction")
+        place = np.append(loop * (n + 1) + rows.first[row], loop * (n + 1) + rows.second[row])
+        place, number = np.unique(place, return_inverse=True)
+        passed = np.bincount(number.ravel(), np.append(sign, -sign))
+        base.require((passed == 0) | (place % (n + 1) == n), "loops", "are not closed")
+        step = np.argsort(row, kind="stable")
+        self.links = loop[step[uses[row[step]] == 2].reshape(-1, 2).T]
+        share = 1 / rows.weight[row[step[uses[row[step]] == 2]][::2]]
+        line, column = np.append(self.links, self.links[::-1], axis=1)
+        order = np.argsort(line, kind="stable")
+        self.begin, self.column = np.searchsorted(line[order], np.arange(self.size + 1)), column[order]
+        self.entry = np.append(share, share)[order]
+        self.closed = np.bincount(loop, uses[row] == 1, self.size) == 0
+        self.resistance, turns, reach, far = (
+            np.bincount(loop, numbers, self.size)
+            for numbers in (
+                1 / rows.weight[row], sign * rows.offset[row] / HALF, rows.limit[row] / HALF,
+                np.abs(rows.offset[row]),
+            )
+        )  # fmt: skip
+        self.margin = MARGIN + base.PRECISION * int(np.diff(start).max(initial=0))
+        self.error, reach = self.margin * (1 + float(far.max(initial=0.0))), reach + RELATIVE
+        least, most = turns + np.ceil(-turns - reach), turns + np.floor(reach - turns)
+        base.require(least < most + 0.5, "loops", "have a charge beyond the limits")
+        nearest = least + np.clip(np.round(-least), 0, np.round(most - least))
+        self.origin, self.most = -nearest, np.round([most - nearest, nearest - least]).astype(np.int64)
+
+    def around(self, numbers: Array) -> Array:
+        """Sums of numbers (l,) over the neighbours of all loops, with the entries of the Laplacian."""
+        line = np.repeat(np.arange(self.size), np.diff(self.begin))
+        return np.bincount(line, self.entry * numbers[self.column], self.size)
+
+
+class Clouds:
+    """Particles and their clouds (Lemma 8).
+
+    most (2, l): how many positive and negative particles each loop may have. loop, sign (p,): of each kind of
+    particle, the positive ones first. owner, cell, weight (k,): the kind, loop and number of each entry of a
+    cloud. at_home (k,): whether that is the loop of the particle. smeared (k,): the smeared particle at the
+    same places; size (k,): of the numbers therein.
+    """
+
+    def __init__(self, charges: Charges, most: Array, start: Array, cell: Array, weight: Array) -> None:
+        side, self.loop = np.nonzero(most)
+        self.most, self.sign, self.count = most, 1 - 2 * side, most[side, self.loop]
+        size, start, cell, weight = charges.size, start.astype(int), cell.astype(int), weight.astype(float)
+        base.require(len(start) == len(side) + 1 and start[0] == 0, "clouds", "are not one for each particle")
+        base.require((np.diff(start) >= 0).all() and start[-1] == len(cell), "clouds", "have other lengths")
+        base.require((cell >= 0) & (cell < size) & (weight > 0), "clouds", "have a wrong loop or weight")
+        self.owner, self.cell, self.weight = np.repeat(np.arange(len(side)), np.diff(start)), cell, weight
+        key = self.owner * size + cell
+        base.require(np.diff(key) > 0, "clouds", "name a loop twice or out of order")
+        side = side[self.owner]
+        self.at_home = cell == self.loop[self.owner]
+        base.require(
+            self.at_home | (most[1 - side, cell] == 0), "clouds", "cover a particle of the other sign"
+        )
+        covered = np.zeros((2, size), bool)
+        covered[side, cell] = True
+        meet = covered[0] & (covered[1] | (charges.around(covered[1].astype(float)) > 0))
+        base.require(~meet, "clouds", "of both signs meet")
+        around = np.zeros(len(cell))
+        block = max(BLOCK // int(np.diff(charges.begin).max(initial=1)), 1)
+        for begin in range(0, len(cell), block):
+            part = slice(begin, begin + block)
+            degree = charges.begin[cell[part] + 1] - charges.begin[cell[part]]
+            step, entry = spans(charges.begin[cell[part]], degree), np.repeat(np.arange(len(degree)), degree)
+            wanted = (self.owner[part] * size)[entry] + charges.column[step]
+            at = np.minimum(np.searchsorted(key, wanted), len(key) - 1)
+            across = np.where(key[at] == wanted, charges.entry[step] * weight[at], 0.0)
+            around[part] = np.bincount(entry, across, len(degree))
+        mass = charges.resistance[cell] * weight
+        self.smeared, self.size = self.at_home - mass + around, self.at_home + mass + around
+        least = charges.margin * self.size
+        base.require(self.smeared >= least, "clouds", "smear a particle to less than nothing")
+
+    def remaining(self, bound: float, added: Array, kind: Array, threshold: float) -> Array:
+        """How many particles fields of at most that energy have, (2, l), from what `stage_of` returns."""
+        may = bound + np.maximum(added, 0.0) <= threshold
+        remaining = np.zeros_like(self.most)
+        remaining[(1 - self.sign) // 2, self.loop] = np.bincount(kind, may, len(self.loop))
+        return remaining
+
+
+def stage_of(charges: Charges, clouds: Clouds, potential: Array, price: Array) -> tuple[float, Array, Array]:
+    """Lemma 9: a lower bound; what each particle adds to it, (c,), and the kind of that particle.
+
+    The c particles are those of the kinds one after the other, first, second and so on of each kind.
+    """
+    kinds, (owner, weight), turn = len(clouds.loop), (clouds.owner, clouds.weight), 2 * charges.error
+    laplace = charges.resistance * potential - charges.around(potential)
+    reach = charges.resistance * np.abs(potential) + charges.around(np.abs(potential))
+    ground, reach = charges.origin + laplace, np.abs(charges.origin) + reach
+    itself = np.bincount(owner, weight * (clouds.at_home + clouds.smeared), kinds)
+    most = np.bincount(owner, weight * (clouds.at_home + clouds.size + 2 * reach[clouds.cell]), kinds)
+    most = most + (2 * np.abs(potential) + np.abs(price))[clouds.loop]
+    margin = charges.margin + base.PRECISION * np.bincount(owner, minlength=kinds)
+    error = margin * most + turn * np.bincount(owner, weight, kinds)
+    pull = potential[clouds.loop] - np.bincount(owner, weight * ground[clouds.cell], kinds)
+    kind = np.repeat(np.arange(kinds), clouds.count)
+    number = spans(0 * clouds.count, clouds.count)
+    added = (itself + 2 * clouds.sign * pull - error)[kind] + 2 * number * (itself - error)[kind]
+    added -= (clouds.sign * price[clouds.loop])[kind]
+    least = math.fsum(np.minimum(added, 0.0)) + math.fsum(price * charges.origin)
+    least -= math.fsum(potential * (charges.origin + ground))
+    size = (
+        np.abs(price) @ (1 + np.abs(charges.origin)) + np.abs(potential) @ (2 + reach) + np.abs(added).sum()
+    )
+    return HALF**2 * (least - (charges.margin + turn) * float(size)), HALF**2 * added, kind
+
+
+def charges_bound(arrays: dict[str, Array], rows: CentredRows, threshold: float) -> float:
+    """The greatest bound of the stages of charges in a certificate; 0 without any.
+
+    Each stage covers what the one before leaves to fields with an energy of at most the threshold.
+    """
+    if "loop_start" not in arrays:
+        return 0.0
+    charges, best = Charges(arrays, rows), 0.0
+    remaining, links, size = charges.most, charges.links, charges.size
+    for number in range(stage_count(arrays)):
+        positive, negative, potential, price, start, cell, weight = (
+            base.take_array(arrays, f"stage_{number}_{name}", kind, size if place < 4 else None)
+            for place, (name, kind) in enumerate(STAGE_PARTS.items())
+        )
+        most = np.array([positive, negative], np.int64)
+        base.require((most >= remaining).ravel(), "stage", "leaves out a particle")
+        base.require(price[links[0]] == price[links[1]], "price", "differs at a link")
+        base.require(charges.closed | (price == 0), "price", "is not 0 at a border")
+        for name, numbers in (("potential", potential), ("price", price)):  # what overflows excludes all
+            base.require(np.abs(numbers) <= FARTHEST, name, "is too large")
+        base.check_room(rows.taken + 200 * (len(cell) + int(most.sum())), rows.memory)
+        clouds = Clouds(charges, most, start, cell, weight)
+        bound, added, kind = stage_of(charges, clouds, potential, price)
+        best, remaining = max(best, bound), clouds.remaining(bound, added, kind, threshold)
+    return best
+
+
+def stage_count(arrays: dict[str, Array]) -> int:
+    """The number of stages of charges."""
+    count = int(base.take_array(arrays, "stages", "<i4", 1)[0])
+    base.require(0 < count <= MOST_STAGES, "stages", "are none or too many")
+    return count
+
+
 # The theorem -----------------------------------------------------------------------------------------------
 
 
@@ -503,14 +658,17 @@ def check_arrays(
     head = base.head_of(arrays, FORMAT, VERSION)
     divisions = base.take_array(arrays, "divisions", "<i4", None).tolist()
     check_names(arrays, len(divisions))
-    fits = 0 < len(divisions) <= MOST_LEVELS and divisions[0] >= 3 and max(divisions) <= MOST_DIVISIONS
-    base.require(fits, "divisions", "is out of range")
+    fits = len(divisions) <= MOST_LEVELS and all(3 <= count <= MOST_DIVISIONS for count in divisions)
+    base.require(fits and (divisions or "loop_start" in arrays), "divisions", "is out of range")
     rows = CentredRows(arrays, limit, memory)
     energy, error, same = energy_of(arrays, rows)
     threshold = base.number_in(head, "threshold", energy + error, math.inf)
-    level, bounds, squares, work = first_level(rows, divisions[0]), list[float](), np.zeros(0, bool), 0
+    bounds, work, squares = list[float](), 0, np.zeros(0, bool)
+    turns = np.ones((len(rows.first), len(TURNS)), bool)
     for number, count in enumerate(divisions):
-        if number:
+        if number == 0:
+            level = first_level(rows, count)
+        else:
             base.require(count in (level.divisions, 3 * level.divisions), "divisions", "grows otherwise")
             size = int(level.squares.begin[rows.pairs])
             packed = base.take_array(arrays, f"level_{number - 1}_squares", "|u1", (size + 7) // 8)
@@ -524,14 +682,12 @@ def check_arrays(
         )
         excess = Excess(level, costs_of(level), *stored_shares(arrays, number, level))
         bounds.append(excess.bound)
-        forests = base.take_array(arrays, f"level_{number}_forests", "<i4", None, None)
-        base.require(len(forests) <= MOST_FORESTS, "forests", "are too many")
-        base.require((forests >= 0) & (forests < rows.pairs), "forests", "names no pair")
-        squares = kept_of(level, excess, forests, threshold)
-    turns = possible_turns(level, squares)
+        squares = kept_of(level, excess, threshold)
+    if divisions:
+        turns = possible_turns(level, squares)
     angles = base.take_array(arrays, "cases", "<f8", None, rows.size)
     base.require(np.abs(angles) <= MOST_ANGLE, "cases", "is too large")
-    least = max(*bounds, cases_bound(rows, turns, angles))
+    least = max(*bounds, cases_bound(rows, turns, angles), charges_bound(arrays, rows, threshold))
     proven = max(0.0, min(least, energy - error) - rows.slack)
     bound = max(0.0, proven - base.SPARE * (1 + proven))
     status, forced = base.status_of(energy, bound), (turns[: rows.pairs] == CENTRAL).all(axis=1) & same
@@ -543,7 +699,11 @@ def check_arrays(
 def check_names(arrays: dict[str, Array], levels: int) -> None:
     """Raise UnreadableError unless the arrays are exactly those of a certificate with so many levels."""
     of_domain = OF_MESH if "instance_faces" in arrays else OF_GRID
-    base.compare_names(arrays, {*PARTS, *of_domain} | ({WEIGHTS} & arrays.keys()), LEVEL_PARTS, levels)
+    more = {WEIGHTS} & arrays.keys()
+    if "loop_start" in arrays:
+        stages = range(stage_count(arrays))
+        more |= {*LOOPS} | {f"stage_{number}_{part}" for number in stages for part in STAGE_PARTS}
+    base.compare_names(arrays, {*PARTS, *of_domain, *more}, LEVEL_PARTS, levels)
 
 
 def check_bytes(data: bytes) -> base.Findings:

@@ -70,10 +70,6 @@ _STALLED: Final = 0.25  # share of the gap, left by half the spacing, above whic
 
 # Fields
 _MUCH_BETTER: Final = 1e-6  # share of the energy by which a better field becomes the centre
-_WIDE: Final = 0.01  # relative gap of a level above which a poor field may cause it, without a limit of time
-_FIRST_SEARCH: Final = 3.0  # seconds after which a proof searches: many need none
-_NEXT_SEARCH: Final = 4.0  # times as late as a search, the next one
-_SEARCH: Final = (0.05, 0.25)  # share of the time left, and of the time before, that a search takes at most
 _CLOSED: Final = 0.95  # share of the time left for a search, whose last solve takes a little more
 _ROUNDS: Final = 5  # rounds of the search without a limit of time
 
@@ -123,8 +119,6 @@ class Descent:
     chain: Chain = field(default_factory=Chain)
     proven: Chain = field(default_factory=Chain)
     searches: int = 0
-    next_search: float = _FIRST_SEARCH
-    began: float = 0.0
     took: float = 0.0  # seconds of the last chain
     tired: bool = False  # whether the last search ended because it found nothing for long
 
@@ -160,7 +154,7 @@ class Descent:
 
     def run(self) -> str:
         """Go through chains of levels until a limit is met or nothing helps; return the reason."""
-        self.began, ended = time.monotonic(), ""
+        ended = ""
         try:
             while not ended or (ended == "labels" and self._search_on()):
                 begin = time.monotonic()
@@ -181,8 +175,6 @@ class Descent:
         while True:
             self._add_clusters(dual)
             rising = self._raise_bound(dual, patient=patient)
-            if self.chain.levels and not self._is_near_end(dual):
-                self._search_if_due()  # before cells are dropped: below a lower energy, fewer are left
             left = self._record_level(dual)
             if (reason := self._reason_to_end()) or left is None:
                 return reason or "time"
@@ -273,18 +265,6 @@ class Descent:
         vortex = len(gaps) == 1 and len(self.best.singularities.index) > 0
         stalled = len(gaps) == 2 and gaps[1] > _STALLED * gaps[0]
         return vortex or stalled
-
-    def _search_if_due(self) -> None:
-        """Search for a better field, where a proof takes a while: with a poor field, it never ends."""
-        left, spent = self.ends.deadline.left(), time.monotonic() - self.began
-        timed, seconds = math.isfinite(left), min(_SEARCH[0] * left, _SEARCH[1] * spent)
-        if timed:
-            due = spent >= self.next_search
-        else:
-            due = not self.searches and self.gap > _WIDE * self.energy(self.best)
-        if due and not self.ends.is_over(seconds):
-            self._search(seconds if timed else math.inf)
-            self.next_search = _NEXT_SEARCH * spent
 
     def _search_on(self) -> bool:
         """Search for the time that no level uses; whether a better field is found in time for a chain."""

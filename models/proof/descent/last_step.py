@@ -4,6 +4,9 @@ Sections 6 and 9 of docs/proofs.md state and prove it. The pieces and their boun
 This module branches and bounds: it cuts the piece of least bound at a pair whose jump is open, or at the
 window of a stroke, finds the least energy on the parts without what is open there, and returns the cuts and
 multipliers that a certificate contains.
+
+Where optima lie on both sides of an edge of a window, only cuts close the gap: without them, nine pixels with
+contradicting strokes keep one of 0.07 % in the 1-norm.
 """
 
 from __future__ import annotations

@@ -2,12 +2,12 @@
 
 docs/orthogonal-proofs.md has the lemmas. On every level a dual rises (orthogonal_dual.py), a field is rounded
 from it, and the checker (check_orthogonal.py) computes the bound and what is left. The next level has a third
-of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters.
+of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters. Where a part
+has no stroke, charges (charges.py) give a first bound.
 """
 
 from __future__ import annotations
 
-import heapq
 import math
 import time
 from dataclasses import dataclass, field
@@ -27,6 +27,7 @@ from ...orthogonal.energy import OrthogonalEnergy, field_of
 from ...processes.deadline import Progress
 from ...search.integer_fields import starting_integers
 from ...search.integer_search import IntegerSearch
+from ..bound.charges import charge_arrays
 from ..bound.orthogonal_dual import RingDual, update_rings
 from ..checkers import check_orthogonal as checker
 from ..checkers.check_certificate import OPTIMAL
@@ -35,8 +36,6 @@ from .record import INSTANCE, Chain, LevelFacts, Proof
 
 if TYPE_CHECKING:
     from .descent import Termination
-
-Neighbours = list[list[tuple[int, int]]]  # of each point, its neighbours and the pairs with them
 
 _COARSEST: Final = 15  # cells of a quarter turn
 _FINEST: Final = 3645
@@ -55,6 +54,7 @@ _TINY: Final = 1e-3  # relative gap below which finer labels follow
 _MOST_OF: Final = 0.9  # of what rings cost: those with the rest come into use later, unless the gap is loose
 _MANY: Final = 0.1  # share of new rings above which they may come into use at the same spacing
 _LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one, and no chain follows a search
+_CHARGES: Final = 0.5  # of the time, which charges leave
 _WIDE: Final = 0.01  # relative gap after which a search follows, from the second spacing on
 _SEARCH: Final = 0.25  # share of the time left that it takes at most
 _ROUNDS: Final = 10  # of a search without a limit of time
@@ -87,35 +87,27 @@ class _TimedChain(Chain):
     pace: float = 0.0  # seconds per unit of work at the last level
 
 
-def two_colours(domain: Domain, near: Neighbours, fixed: Bools) -> NDArray[np.uint8]:
+def two_colours(domain: Domain, fixed: Bools) -> NDArray[np.uint8]:
     """0 or 1 of each point, such that most pairs have both, and 0 where it is fixed; (n,)."""
+    near = list[list[int]]([] for _ in range(domain.size))
+    for i, j in zip(domain.first.tolist(), domain.second.tolist(), strict=True):
+        near[i].append(j)
+        near[j].append(i)
     side = 1 - 2 * (grow_forest(domain.size, domain.first, domain.second, []).depth % 2)
     for i in np.tile(np.nonzero(~fixed)[0], _SWEEPS).tolist():
-        if side[i] * sum(side[j] for j, _ in near[i]) > 0:
+        if side[i] * sum(side[j] for j in near[i]) > 0:
             side[i] = -side[i]
     return np.array(side < 0, dtype=np.uint8)
-
-
-def spanning_forest(near: Neighbours, value: Floats) -> list[int]:
-    """Pairs of a forest, those of great value first, each with a point that is joined to those before."""
-    forest, reached = list[int](), set[int]()
-    waiting = [(1.0, root, -1) for root in range(len(near))]
-    while waiting:
-        _, point, pair = heapq.heappop(waiting)
-        if point not in reached:
-            reached.add(point)
-            forest.append(pair)
-            for step in near[point]:
-                heapq.heappush(waiting, (-value[step[1]], *step))
-    return [pair for pair in forest if pair >= 0]
 
 
 @dataclass
 class _Prover:
     """The best field, and the chain that proves most. z: integers of the field; least: its energy.
 
-    starts: integers to begin with. arrays: of all certificates. limit: of Lemma 1. hunt: the search for
-    better integers. searched: its seconds. took: seconds of the last chain. reason: why no level is begun.
+    starts: integers to begin with. arrays: of all certificates. rows: without a centre. charges, of_charges:
+    their bound, and their arrays; charged: the energy of the field for which they were found. limit: of Lemma
+    1. hunt: the search for better integers. searched: its seconds. took: seconds of the last chain. reason:
+    why no level is begun.
     """
 
     instance: Instance
@@ -126,6 +118,10 @@ class _Prover:
     seed: int = 0
     proven: _TimedChain = field(default_factory=_TimedChain)
     arrays: Arrays = field(default_factory=dict)
+    rows: CentredRows | None = None
+    charges: float = 0.0
+    of_charges: Arrays = field(default_factory=dict)
+    charged: float = math.inf
     limit: Floats | None = None
     hunt: IntegerSearch | None = None
     searched: float = 0.0
@@ -136,8 +132,8 @@ class _Prover:
         self.z = min(self.starts, key=self.energy.least_total)
         self.least, self.began = self.energy.least_total(self.z), self.ends.deadline.clock()
 
-    def _prepare_levels(self) -> None:
-        """Compute what all levels share."""
+    def _prepare(self) -> CentredRows:
+        """Compute what all levels share; the rows without a centre."""
         domain, arrays = self.instance.domain, instance_arrays(self.instance).items()
         length = np.diff(domain.rings.start)
         rings = domain.rings.keep((length >= 3) & (length <= checker.MOST_RING))
@@ -147,13 +143,41 @@ class _Prover:
         self.arrays |= {"ring_sign": rings.sign.astype(np.int8), "centre": np.zeros(domain.size)}
         self.arrays["half"] = np.zeros(domain.size, np.uint8)
         rows, links = checker.CentredRows(self.arrays), self.energy.links
-        self.near: Neighbours = [[] for _ in range(domain.size)]
-        for pair, (i, j) in enumerate(rows.ends[: rows.pairs]):
-            self.near[i].append((j, pair))
-            self.near[j].append((i, pair))
         self.order = reverse_cuthill_mckee(links + links.T, symmetric_mode=True).astype(np.int64)
-        self.arrays["half"] = two_colours(domain, self.near, rows.fixed[:-1])
+        if self._coarsest_costs() <= _MOST_COSTS:  # otherwise no level follows, and this takes long
+            self.arrays["half"] = two_colours(domain, rows.fixed[:-1])
         self.limit = rows.limit
+        return rows
+
+    def _bound_by_charges(self) -> str:
+        """Bound the energy by charges where a part has no stroke; the reason why no level follows.
+
+        It is due at the beginning and for each better field, because that excludes more.
+        """
+        rows, deadline, quick = self.rows or self._prepare(), self.ends.deadline, self.rows is None
+        self.rows, later = rows, _CHARGES * deadline.left() if math.isfinite(deadline.left()) else 0.0
+        while rows.fixed[:-1].any() and self.least < self.charged:
+            begin = deadline.clock()
+            chain, centred = self._begin_chain()
+            took, over = deadline.clock() - begin, lambda: self.ends.is_over(max(later, self.proven.seconds))
+            is_over = (lambda: True) if quick else over  # one look shows whether a search pays first
+            arrays = charge_arrays(self.instance.domain, centred, chain.threshold, is_over)
+            begin = deadline.clock()
+            bound = checker.charges_bound(arrays, centred, chain.threshold)
+            self.charged = math.inf if quick else self.least
+            if bound > self.charges:
+                before = chain.arrays.keys() - self.of_charges.keys()
+                chain.arrays = {name: chain.arrays[name] for name in sorted(before)} | arrays
+                self.charges, self.of_charges, chain.convex = bound, arrays, bound
+                chain.seconds = took + deadline.clock() - begin
+                self.proven = max(chain, self.proven, key=lambda chain: chain.bound)
+                self.progress(f"energy {self.least:.5g}, bound {bound:.5g}, charges")
+            if self.charges > 0 and (reason := self._reason_to_end(self.proven)):
+                return reason
+            if self.least - self.charges < _LOOSE * self.least:
+                self._search_if_due()
+            quick = False
+        return ""
 
     def proof(self, ended: str, began: float) -> Proof:
         """The proof so far, not checked."""
@@ -162,7 +186,7 @@ class _Prover:
         return Proof(
             field=best, energy=energy, bound=min(chain.bound, energy), forced=chain.forced, levels=levels,
             seconds=time.monotonic() - began, ended=ended, arrays=chain.arrays, threshold=chain.threshold,
-            reason="" if levels else self.reason,
+            reason="" if chain.bound else self.reason,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -172,6 +196,8 @@ class _Prover:
         """
         try:
             while True:
+                if reason := self._bound_by_charges():
+                    return reason
                 begin = self.ends.deadline.clock() - self.searched
                 reason = self._go_through_levels()
                 self.took = self.ends.deadline.clock() - self.searched - begin
@@ -180,10 +206,14 @@ class _Prover:
         except MemoryError:
             return "memory"
 
+    def _coarsest_costs(self) -> int:
+        """How many pairs of labels the coarsest level has."""
+        return len(self.instance.domain.first) * (_COARSEST + 1) ** 2
+
     def _reason_against_levels(self) -> str:
         """The reason why no level is begun; empty if one is: on few points, a first one whatever the time."""
         reason, small = self.ends.reason(), self.instance.domain.size <= checker.MOST_DENSE
-        costs = len(self.instance.domain.first) * (_COARSEST + 1) ** 2
+        costs = self._coarsest_costs()
         if costs > _MOST_COSTS:
             self.reason = (
                 f"the coarsest level has {costs} pairs of labels; at most {_MOST_COSTS} fit in memory"
@@ -192,14 +222,12 @@ class _Prover:
         if not small and not reason and self.ends.is_over(_SECONDS * costs):
             self.reason = f"the coarsest level takes about {_SECONDS * costs:.0f} s; increase the time limit"
             return "time"
-        return "" if reason == "time" and small and not self.proven.levels else reason
+        return "" if reason == "time" and small and not self.proven.bound else reason
 
     def _go_through_levels(self) -> str:
         """Go through the levels round the best field; the reason of the end, empty for a better field."""
         if reason := self._reason_against_levels():
             return reason
-        if not self.arrays:
-            self._prepare_levels()
         chain, rows = self._begin_chain()
         rings, level, before = list[int](), checker.first_level(rows, _COARSEST), None
         while True:
@@ -215,13 +243,14 @@ class _Prover:
                 return ""
             least = self.least
             squares = self._record(chain, dual, costs)
-            if chain.bound >= self.proven.bound:
+            adds = chain.bound > self.charges or not self.charges or chain.forced
+            if adds and chain.bound >= self.proven.bound:  # a certificate of charges alone is small
                 self.proven = chain
             reason = self._reason_to_end(chain)
             search = level.divisions > _COARSEST and chain.gap > _WIDE * self.least
             if reason or self.least < least or (search and self._search_if_due()):
                 return reason
-            loose = self.least - chain.bound > _LOOSE * self.least
+            loose = self.least - dual.bound > _LOOSE * self.least  # whatever charges prove
             more = self._more_rings(dual, 1.0 if loose else _MOST_OF)
             many = len(more) > _MANY * len(rings)
             closing |= many and loose and level.divisions == _COARSEST
@@ -234,10 +263,13 @@ class _Prover:
     def _begin_chain(self) -> tuple[_TimedChain, CentredRows]:
         """A chain round the best field, without levels, and its rows."""
         best = field_of(self.instance, self.z, self.energy)
-        arrays = self.arrays | {"centre": self.energy.fit_angles(self.z), "divisions": np.zeros(0, np.int32)}
+        arrays = self.arrays | self.of_charges | {"centre": self.energy.fit_angles(self.z)}
+        arrays["divisions"] = np.zeros(0, np.int32)
+        arrays["cases"] = np.zeros((0, self.instance.domain.size))
         rows = checker.CentredRows(arrays, self.limit)
         energy, error, _ = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
-        return _TimedChain(arrays=arrays, threshold=energy * (1 + _BETTER) + 2 * error), rows
+        most = energy * (1 + _BETTER) + 2 * error
+        return _TimedChain(arrays=arrays, threshold=most, convex=self.charges), rows
 
     def _ascend(self, dual: RingDual, chain: _TimedChain, ahead: float) -> bool:
         """Passes until the bound rises slowly, or few labels or seconds are left; whether rings close it."""
@@ -326,12 +358,8 @@ class _Prover:
         numbers = dual.arrays(max(chain.gap, 1e-6 * (1 + chain.threshold)))
         chain.arrays |= {prefix + name: array for name, array in numbers.items()}
         excess = checker.Excess(level, costs, *checker.stored_shares(chain.arrays, len(chain.levels), level))
-        count, lost = np.diff(level.pairs.begin), np.minimum(excess.pairs, max(most - excess.bound, 0.0))
-        value = (np.bincount(level.pairs.row, lost, len(count)) / count)[: rows.pairs]
-        forests = np.array([spanning_forest(self.near, value)], dtype=np.int32)
-        squares: Bools = checker.kept_of(level, excess, forests, most)
-        bits = np.packbits(squares[: level.squares.begin[rows.pairs]])
-        chain.arrays |= {f"{prefix}forests": forests, f"{prefix}squares": bits}
+        squares: Bools = checker.kept_of(level, excess, most)
+        chain.arrays[f"{prefix}squares"] = np.packbits(squares[: level.squares.begin[rows.pairs]])
         chain.arrays["divisions"] = np.append(chain.arrays["divisions"], np.int32(level.divisions))
         chain.levels.append(LevelFacts(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
         turns = checker.possible_turns(level, squares)
@@ -339,7 +367,7 @@ class _Prover:
         cases = [(rows.nearest + np.array(case)).astype(np.int32) for case in checker.cases_of(turns)]
         angles = np.array([self.energy.fit_angles(z) for z in cases]).reshape(-1, rows.size)
         chain.arrays["cases"] = angles
-        chain.convex = checker.cases_bound(rows, turns, angles)
+        chain.convex = max(self.charges, checker.cases_bound(rows, turns, angles))
         for z in cases:
             self._offer(z)
         seconds = self.ends.deadline.clock() - began

@@ -88,6 +88,10 @@ class Claim:
     norm: Norm = 2
     proven: Findings | None = dataclasses.field(default=None, init=False, repr=False)  # not by `replace`
 
+    def __repr__(self) -> str:
+        numbers = f"norm {self.norm}, energy {self.energy:.6g}, bound {self.bound:.6g}"
+        return f"<{type(self).__name__} on {self.field.instance.name}: {self.status}, {numbers}>"
+
     def confirmed(self, proven: Findings, **changes: Any) -> Self:
         """The claim with the findings of the checker, and with other changes."""
         claim = replace(self, forced=proven.forced, **changes)
@@ -105,7 +109,7 @@ class Claim:
         return gap_of(self.energy, self.bound)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class Proof(Claim):
     """The best field found, the bound that is proven, and how: a claim with its proof.
 
@@ -115,7 +119,7 @@ class Proof(Claim):
         As in `Claim`.
     levels
         The last chain of levels, coarsest first, on the parts of the mask that have a stroke. Each covers
-        what the one before leaves.
+        what the one before leaves. Empty where nothing is proven, or charges alone prove the bound.
     seconds
         Duration of the work; for crosses of any angle without the check.
     ended
@@ -136,6 +140,11 @@ class Proof(Claim):
     arrays: Arrays = dataclasses.field(repr=False)
     threshold: float = math.inf
     reason: str = ""
+
+    @property
+    def has_bound(self) -> bool:
+        """Whether there is something for the checker to confirm: levels, or charges."""
+        return bool(self.levels) or "loop_start" in self.arrays
 
     def certificate(self) -> Arrays:
         """The arrays of the certificate, with the claim."""

@@ -1,25 +1,13 @@
 """Sets of files and their manifests: round trip, determinism, and what is refused."""
 
-from __future__ import annotations
-
-import json
-from pathlib import Path
-
+import crossfield as cf
 import numpy as np
 import pytest
 from cases import SKEWED, make_field, make_instance, make_problem
-from crossfield.export.bundle.manifest import read_manifest
-from crossfield.export.bundle.problem_files import write_all, write_problem
-from crossfield.export.formats.registry import FORMATS, write
-from crossfield.models.errors import (
-    FormulationError,
-    InputError,
-    InstanceError,
-    UnsupportedByFormatError,
-)
-from crossfield.models.formulations.problem import with_integers_fixed
-from crossfield.models.instance.file import read_instance, write_instance
+from crossfield.export.formats.registry import FORMATS
+from crossfield.export.writing.canonical import CanonicalForm
 from folders import contents
+from forging import change
 from loops import for_each
 
 OPTIONS = [
@@ -30,12 +18,11 @@ OPTIONS = [
 
 
 @for_each("name, options", OPTIONS)
-@for_each("gauge", ["strokes", "box"])
-def test_a_manifest_gives_its_problem_back(name, options, gauge, tmp_path):
-    problem = make_problem(name, make_instance(gauge=gauge), **options)
-    manifest = write_problem(problem, tmp_path)
+def test_a_manifest_gives_its_problem_back(name, options, tmp_path):
+    problem = make_problem(name, make_instance(gauge="box" if options else "strokes"), **options)
+    manifest = cf.write(problem, tmp_path, formats=["nl", "gms", "lp", "mps"])
     assert manifest.path == tmp_path / f"tiny.{name}.manifest.json"
-    again = read_manifest(manifest.path)
+    again = cf.read_manifest(manifest.path)
     assert again.document == manifest.document
     assert (again.formulation, again.folder) == (name, tmp_path)
     rebuilt = again.problem()
@@ -46,9 +33,10 @@ def test_a_manifest_gives_its_problem_back(name, options, gauge, tmp_path):
         np.testing.assert_array_equal(rebuilt.jumps, problem.jumps)
 
 
-def test_refused_and_lifted_formats_are_listed(tmp_path):
+def test_refused_and_lifted_formats_and_the_jumps_of_the_start_are_listed(tmp_path):
     instance = make_instance()
-    parity, quartic = write_all(instance, tmp_path, formulations=["minlp-parity", "minlp-quartic"])
+    field, names = make_field(instance), ["minlp-parity", "minlp-quartic", "qp-fixed"]
+    parity, quartic, fixed = cf.write_all(instance, tmp_path, formulations=names, start=field)
     assert set(parity.document["refused"]) == {"lp", "mps"}
     assert all("minlp-quartic" in reason for reason in parity.document["refused"].values())
     assert {entry["format"] for entry in parity.document["files"]} == {"nl", "gms"}
@@ -56,20 +44,15 @@ def test_refused_and_lifted_formats_are_listed(tmp_path):
     by_format = {entry["format"]: entry["lifted"] for entry in quartic.document["files"]}
     assert by_format["nl"] == by_format["gms"] == ""
     assert by_format["lp"] == by_format["mps"] == "z = p1 beta_i with the hull facets (26)-(29), exact"
-
-
-def test_jumps_come_from_the_start(tmp_path):
-    instance = make_instance("full")
-    field = make_field(instance)
-    (manifest,) = write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["mps"], start=field)
-    np.testing.assert_array_equal(manifest.problem().jumps, field.p)
-    listed = dict(manifest.document["jumps"])
-    assert listed == {pair: jump for pair, jump in enumerate(field.p.tolist()) if jump}
+    assert fixed.problem().jumps.tolist() == field.p.tolist()
+    assert dict(fixed.document["jumps"]) == {pair: jump for pair, jump in enumerate(field.p) if jump}
+    cf.write_all(make_instance(seed=8), tmp_path, formulations=["milp-mccormick"], formats=["lp"])
+    assert cf.read_instance(tmp_path / "tiny.instance.json").sha256 == make_instance(seed=8).sha256
 
 
 def test_options_apply_where_a_formulation_has_them(tmp_path):
     instance, messages = make_instance(), []
-    manifests = write_all(
+    manifests = cf.write_all(
         instance,
         tmp_path,
         formats=["nl"],
@@ -82,42 +65,26 @@ def test_options_apply_where_a_formulation_has_them(tmp_path):
     assert options["milp-mccormick"]["facet"] == "printed"
     assert options["miqp-exact"] == {"facet": "hull", "stroke_norm": 2, "beta_norm": 2, "relax": True}
     assert options["qp-fixed"]["relax"] is False
-    with pytest.raises(FormulationError, match="there is no option 'nonsense'; choose one of facet"):
-        write_all(instance, tmp_path, options={"nonsense": 1}, start=make_field(instance))
-
-
-def test_the_instance_is_that_of_the_last_export(tmp_path):
-    for instance in (make_instance(), make_instance(seed=8)):
-        write_all(instance, tmp_path, formulations=["milp-mccormick"], formats=["lp"])
-        assert read_instance(tmp_path / "tiny.instance.json").sha256 == instance.sha256
+    with pytest.raises(cf.FormulationError, match="there is no option 'nonsense'; choose one of facet"):
+        cf.write_all(instance, tmp_path, options={"nonsense": 1}, start=make_field(instance))
 
 
 # what is refused
 
 
 @pytest.fixture
-def written(tmp_path: Path) -> Path:
+def written(tmp_path):
     """A manifest of qp-fixed with its instance beside it."""
-    return write_problem(make_problem("qp-fixed", make_instance()), tmp_path, formats=["nl"]).path
-
-
-def changed(path: Path, *keys: str, value: object) -> Path:
-    document = json.loads(path.read_text())
-    place = document
-    for key in keys[:-1]:
-        place = place[key]
-    place[keys[-1]] = value
-    path.write_text(json.dumps(document))
-    return path
+    return cf.write(make_problem("qp-fixed", make_instance()), tmp_path, formats=["nl"]).path
 
 
 def test_another_instance_beside_a_manifest_is_refused(written):
-    write_instance(make_instance(seed=9), written.parent / "tiny.instance.json")
-    with pytest.raises(InstanceError, match=r"tiny\.instance\.json: is another instance"):
-        read_manifest(written).problem()
+    cf.write_instance(make_instance(seed=9), written.parent / "tiny.instance.json")
+    with pytest.raises(cf.InstanceError, match=r"tiny\.instance\.json: is another instance"):
+        cf.read_manifest(written).problem()
     (written.parent / "tiny.instance.json").unlink()
-    with pytest.raises(InputError, match=r"tiny\.instance\.json: cannot be read"):
-        read_manifest(written).problem()
+    with pytest.raises(cf.InputError, match=r"tiny\.instance\.json: cannot be read"):
+        cf.read_manifest(written).problem()
 
 
 def test_damaged_manifests_are_refused(written):
@@ -126,72 +93,66 @@ def test_damaged_manifests_are_refused(written):
     other += [b'{"format": "crossfield-instance", "version": 1}']
     for text in (*other, *(whole[:end] for end in range(0, len(whole) - 2, 37))):
         written.write_bytes(text)
-        with pytest.raises(InstanceError, match=r"tiny\.qp-fixed\.manifest\.json: ") as error:
-            read_manifest(written)
+        with pytest.raises(cf.InstanceError, match=r"tiny\.qp-fixed\.manifest\.json: ") as error:
+            cf.read_manifest(written)
         assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize(
-    "keys, value, message",
+@for_each(
+    "key, value, message",
     [
-        (["version"], 2, "has version 2, but this program reads version 1"),
-        (["version"], True, "version"),
-        (["unknown"], 1, "unknown"),
-        (["options", "colour"], 1, "colour"),
-        (["instance", "file"], "../tiny.instance.json", "instance.file"),
-        (["instance", "file"], "a/b.json", "instance.file"),
-        (["instance", "file"], "a\\b.json", "instance.file"),
-        (["instance", "file"], "", "instance.file"),
-        (["instance", "file"], ".hidden", "instance.file"),
-        (["instance", "sha256"], "0", "instance.sha256"),
-        (["formulation"], "../x", "formulation"),
-        (["options", "stroke_norm"], 3, "stroke_norm"),
-        (["jumps"], [[0]], "jumps"),
-        (["jumps"], [[-1, 1]], "jumps"),
-        (["jumps"], [[10**30, 1]], "jumps"),
-        (["jumps"], [[0, 1e9]], "jumps"),
-        (["jumps"], "none", "jumps"),
-        (["files"], [{"name": "/etc/passwd", "format": "nl", "sha256": "0" * 64, "bytes": 1}], "files"),
-        (["class"], "SDP", "class"),
+        # What breaks the schema
+        ("version", 2, "has version 2, but this program reads version 1"),
+        ("version", True, "version"),
+        ("unknown", 1, "unknown"),
+        ("options__colour", 1, "colour"),
+        ("instance__file", "../tiny.instance.json", "instance.file"),
+        ("instance__file", "a/b.json", "instance.file"),
+        ("instance__file", "a\\b.json", "instance.file"),
+        ("instance__file", "", "instance.file"),
+        ("instance__file", ".hidden", "instance.file"),
+        ("instance__sha256", "0", "instance.sha256"),
+        ("formulation", "../x", "formulation"),
+        ("options__stroke_norm", 3, "stroke_norm"),
+        ("jumps", [[0]], "jumps"),
+        ("jumps", [[-1, 1]], "jumps"),
+        ("jumps", [[10**30, 1]], "jumps"),
+        ("jumps", [[0, 1e9]], "jumps"),
+        ("jumps", "none", "jumps"),
+        ("files", [{"name": "/etc/passwd", "format": "nl", "sha256": "0" * 64, "bytes": 1}], "files"),
+        ("class", "SDP", "class"),
+        # What contradicts itself
+        ("formulation", "mlip", "no formulation 'mlip'"),
+        ("formulation", "milp-mccormick", "leave p out"),
+        ("options__relax", True, "qp-fixed has no option relax"),
+        ("jumps", None, "takes the jumps of all pairs"),
+        ("jumps", [[8, 1]], "lists a jump of a pair that the instance does not have"),
+        ("jumps", [], "does not fit its own instance"),
+        ("jumps", [[0, 64]], "does not fit its own instance"),
+        ("sha256", "0" * 64, "does not fit its own instance"),
+        ("columns", lambda names: names[::-1], "columns in another order"),
     ],
 )
-def test_documents_that_break_the_schema_are_refused(keys, value, message, written):
-    with pytest.raises(InstanceError, match=rf"manifest\.json: .*{message}"):
-        read_manifest(changed(written, *keys, value=value))
-
-
-@pytest.mark.parametrize(
-    "keys, value, error, message",
-    [
-        (["formulation"], "mlip", FormulationError, "no formulation 'mlip'"),
-        (["formulation"], "milp-mccormick", FormulationError, "leave p out"),
-        (["options", "relax"], True, FormulationError, "qp-fixed has no option relax"),
-        (["jumps"], None, FormulationError, "takes the jumps of all pairs"),
-        (["jumps"], [[8, 1]], InstanceError, "lists a jump of a pair that the instance does not have"),
-        (["jumps"], [], InstanceError, "does not fit its own instance"),
-        (["jumps"], [[0, 64]], InstanceError, "does not fit its own instance"),
-        (["sha256"], "0" * 64, InstanceError, "does not fit its own instance"),
-    ],
-)
-def test_documents_that_contradict_themselves_are_refused(keys, value, error, message, written):
-    renamed = written.rename(written.with_name("renamed.json"))
-    manifest = read_manifest(changed(renamed, *keys, value=value))
-    with pytest.raises(error, match=rf"renamed\.json: .*{message}"):
-        manifest.problem()
+def test_documents_that_break_the_schema_or_contradict_themselves_are_refused(key, value, message, tmp_path):
+    problem = make_problem("qp-fixed", make_instance())
+    path = cf.write(problem, tmp_path, formats=["nl"]).path.rename(tmp_path / "renamed.json")
+    change(path, **{key: value})
+    with pytest.raises((cf.InstanceError, cf.FormulationError), match=rf"renamed\.json: .*{message}"):
+        cf.read_manifest(path).problem()
 
 
 def test_problems_that_no_manifest_records_are_refused(tmp_path):
     problem = make_problem("minlp-cubic", make_instance())
-    for other in (problem.lifted, with_integers_fixed(problem, make_field(problem.instance))):
-        with pytest.raises(InputError, match="a manifest cannot record minlp-cubic"):
-            write_problem(other, tmp_path / "set")
+    for other in (problem.lifted, problem.with_integers_fixed(make_field(problem.instance))):
+        with pytest.raises(cf.InputError, match="a manifest cannot record minlp-cubic"):
+            cf.write(other, tmp_path / "set", formats=["nl", "gms", "lp", "mps"])
     assert list(tmp_path.iterdir()) == []
-    write(problem.lifted, tmp_path / "single.lp")
-    fixed = with_integers_fixed(problem, make_field(problem.instance))
-    with pytest.raises(UnsupportedByFormatError, match="write nl, lp or mps"):
-        write(fixed, tmp_path / "fixed.mod")
+    cf.write(problem.lifted, tmp_path / "single.lp")
+    fixed = problem.with_integers_fixed(make_field(problem.instance))
+    with pytest.raises(cf.UnsupportedByFormatError, match="write nl, lp or mps"):
+        cf.write(fixed, tmp_path / "fixed.mod")
     assert list(contents(tmp_path)) == ["single.lp"]
-    write(fixed, tmp_path / "fixed.gms")
+    cf.write(fixed, tmp_path / "fixed.gms")
 
 
 @pytest.mark.parametrize("name", FORMATS)
@@ -200,36 +161,68 @@ def test_a_start_is_in_the_file_or_refused(tmp_path, name):
     problem, path = make_problem("milp-mccormick", make_instance()), tmp_path / f"model.{name}"
     field = make_field(problem.instance)
     if FORMATS[name].has_start:
-        write(problem, tmp_path / f"without.{name}")
-        write(problem, path, start=field)
+        cf.write(problem, tmp_path / f"without.{name}")
+        cf.write(problem, path, start=field)
         assert path.stat().st_size > (tmp_path / f"without.{name}").stat().st_size
         return
     with pytest.raises(
-        UnsupportedByFormatError, match=rf"model\.{name}: .* \(nl, gms, qplib, bar\).*write_problem"
+        cf.UnsupportedByFormatError, match=rf"model\.{name}: .* \(nl, gms, qplib, bar\).*formats="
     ):
-        write(problem, path, start=field)
+        cf.write(problem, path, start=field)
     assert list(tmp_path.iterdir()) == []
-    manifest = write_problem(problem, tmp_path, formats=[name], start=field)
+    manifest = cf.write(problem, tmp_path, formats=[name], start=field)
     assert manifest.document["refused"] == {}
     assert list(tmp_path.glob("*.gurobi.start.mst"))
-
-
-def test_formats_that_hold_nothing_of_what_was_asked_are_refused_before_a_file(tmp_path):
-    instance = make_instance()
-    for formats in (["mps"], ["lp", "qplib"]):
-        with pytest.raises(UnsupportedByFormatError, match="minlp-parity; write minlp-quartic"):
-            write_all(instance, tmp_path, formulations=["minlp-parity"], formats=formats)
-        with pytest.raises(UnsupportedByFormatError, match="minlp-parity; write minlp-quartic"):
-            write_problem(make_problem("minlp-parity", instance), tmp_path, formats=formats)
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("name", ["A.LP", "A.Nl.GZ", "A.MOD.Gz"])
 def test_suffixes_in_upper_case_are_those_in_lower_case(tmp_path, name):
     """Same bytes, and companions with the same stem."""
     problem = make_problem("milp-mccormick", make_instance("hole"))
-    upper = write(problem, tmp_path / name).files
-    lower = write(problem, tmp_path / f"a{name[1:].lower()}").files
+    upper = cf.write(problem, tmp_path / name).files
+    lower = cf.write(problem, tmp_path / f"a{name[1:].lower()}").files
     assert name in upper
     assert [file.lower() for file in upper] == [file.lower() for file in lower]
     assert list(upper.values()) == list(lower.values())
+
+
+# Answers without names: lifting and the order of columns come from the manifest
+
+
+def raw_of_glpk(path, form, file, point):
+    """A file as from `glpsol -w` for an LP or MPS file: values in the order of its columns, no names."""
+    values = np.append(point, 1.0)[form.order(file)]
+    rows = [f"i {place + 1} 0" for place in range(form.row_count(file))]
+    columns = [f"j {place + 1} {value!r}" for place, value in enumerate(values.tolist())]
+    name = f"{form.problem.instance.name}_{form.problem.stamp}" if file == "mps" else ""
+    head = [f"c Problem:    {name}", f"c Objective:  obj_{form.problem.stamp} = 0 (MINimum)"]
+    sizes = f"s mip {len(rows)} {len(columns)} f 0"
+    path.write_text("\n".join([*head, sizes, *rows, *columns, "e o f", ""]))
+    return path
+
+
+def test_values_without_names_follow_the_file_that_the_manifest_lists(tmp_path):
+    problem = make_problem("minlp-cubic", make_instance())
+    manifest = cf.read_manifest(cf.write(problem, tmp_path, formats=["nl", "gms", "lp", "mps"]).path)
+    held = manifest.problems_by_format(problem)
+    assert {name: form.sha256 == problem.sha256 for name, form in held.items()} == {
+        "nl": True, "gms": True, "lp": False, "mps": False,
+    }  # fmt: skip
+    point = problem.lifted.point(make_field(problem.instance))
+    for file in ("lp", "mps"):
+        path = raw_of_glpk(tmp_path / "x.sol", CanonicalForm(problem.lifted), file, point)
+        for solution in (cf.read_solution(path, problem, held=held), cf.read_solution(path, problem)):
+            np.testing.assert_array_equal(solution.point, point)
+        with pytest.raises(cf.SolutionError, match="the problem has"):
+            cf.read_solution(path, problem, held={file: problem})
+
+
+def test_values_without_names_of_a_file_that_cannot_hold_the_problem_are_refused(tmp_path):
+    problem = make_problem("milp-mccormick", make_instance())
+    path = raw_of_glpk(
+        tmp_path / "x.sol", CanonicalForm(problem), "lp", problem.point(make_field(problem.instance))
+    )
+    parity = make_problem("minlp-parity", problem.instance)
+    path.write_text(path.read_text().replace(problem.stamp, parity.stamp))
+    with pytest.raises(cf.SolutionError, match="lp holds nothing beyond quadratic"):
+        cf.read_solution(path, parity)

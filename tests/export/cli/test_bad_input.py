@@ -7,13 +7,14 @@ import sys
 from pathlib import Path
 
 import crossfield as cf
-import numpy as np
 import pytest
+from cases import make_instance
 from children import complaints
 from crossfield.export.cli.app import invoke
-from crossfield.models.instance.symmetries import turned
 from crossfield.models.written_files import LIST
 from loops import for_each
+from meshes import box, write_obj
+from moves import turned
 from PIL import Image, ImageDraw
 
 SVG = '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40">{}</svg>'
@@ -48,30 +49,25 @@ def refused(tmp_path, capsys):
 
 @pytest.fixture
 def instance():
-    mask = np.ones((2, 2), dtype=bool)
-    return cf.Instance.on_pixels(
-        "tiny", mask, np.array([[0, 0], [1, 1]]), np.array([0.3, 1.2]), np.array([1.0, 0.5])
-    )
+    return make_instance("row")
 
 
-def picture(*boxes, lines=(), paper=0, size=(60, 40)):
+def picture(paper, boxes=(), lines=(), size=(60, 40)):
     image = Image.new("L", size, paper)
-    for box in boxes:
-        ImageDraw.Draw(image).rectangle(box, fill=255)
+    for box_of_mask in boxes:
+        ImageDraw.Draw(image).rectangle(box_of_mask, fill=255)
     for line in lines:
         ImageDraw.Draw(image).line(line, fill=0, width=3)
     return image
 
 
 PICTURES = {
-    "sketch.png": picture(lines=[(5, 5, 55, 35), (5, 35, 55, 5)], paper=255),
-    "blank.png": picture(paper=255),
-    "small.png": picture((0, 0, 9, 9), size=(50, 40)),
-    "off.png": picture((27, 0, 33, 4)),
-    "black.png": picture(),
+    "sketch.png": picture(255, lines=[(5, 5, 55, 35), (5, 35, 55, 5)]),
+    "blank.png": picture(255),
+    "small.png": picture(0, [(0, 0, 9, 9)], size=(50, 40)),
+    "off.png": picture(0, [(27, 0, 33, 4)]),
+    "black.png": picture(0),
 }
-
-
 SKETCHES = {
     "words.png": (b"these are words", "not a whole picture"),
     "bare.svg": (SVG.format("").encode(), "no stroke"),
@@ -103,6 +99,10 @@ def files(tmp_path, monkeypatch, instance):
         change(document)
         Path(name).write_text(json.dumps(document))
     cf.write_field(cf.greedy_field(turned(instance)), "other.npz")
+    cf.write_field(cf.greedy_field(instance), "field.npz")
+    cf.write_field(cf.greedy_field(instance), "theirs.rawfield")
+    cf.write_instance(instance.with_weights(stroke_weight=10), "heavy.json")
+    write_obj(Path("cube.obj"), box())
 
 
 NO_SUCH_FORMULATION = (
@@ -122,10 +122,10 @@ REFUSED = [
     ("run sketch.png --mask off.png", "", "no stroke lies inside the mask"),
     ("run sketch.png --mask black.png", "", "black all over"),
     ("run mouse --mask black.png", "", "leave --mask out"),
-    ("run tiny.json --size 30", "", "leave --size and --mask out"),
+    ("run tiny.json --size 30", "", "is no drawing; leave --size out"),
     ("run missing.svg", "", "crossfield list"),
     ("run .", "", "is a directory"),
-    ("draw field.npz -o out.png", "", "no such file"),
+    ("draw none.npz -o out.png", "", "no such file"),
     ("export tiny.json -f milp-mccormick -f milp-mcormick", "", re.escape(NO_SUCH_FORMULATION)),
     ("export tiny.json -F nl -F xyz", "", "there is no format 'xyz'; choose one of nl, gms, lp, mps"),
     ("solve tiny.json -f quartc", "", r"there is no formulation 'quartc' \(is it quartic\?\)"),
@@ -140,9 +140,17 @@ REFUSED = [
     ("export tiny.json --start other.npz", "other.npz: the field is on another instance", ""),
     ("instance mouse -o out.txt", "out.txt: ", ".json, .npz"),
     ("instance mouse -o out", "out: ", ".json, .npz"),
-    ("draw tiny.json -o out.bmp", "out.bmp: ", ".png, .svg, .pdf"),
+    ("draw tiny.json -o out.bmp", "out.bmp: ", ".png, .svg"),
     ("draw tiny.txt -o out.png", "tiny.txt: ", ".npz, .json"),
     ("read tiny.sol --manifest tiny.json -o out.png", "out.png: ", ".npz, .json, .rawfield"),
+    ("draw theirs.rawfield -o out.png", "", "holds no instance; give its instance with --on"),
+    ("draw other.npz --on tiny.json -o out.png", "", "the field is on another instance"),
+    ("solve heavy.json -m search --start field.npz", "", "stroke weight 10.*size, gauge and weights"),
+    ("instance mouse --sharp 35 -o x.json", "mouse: is no mesh file; leave --sharp out", ""),
+    ("instance tiny.json --weights dual -o x.json", "tiny.json: is no mesh file", ""),
+    ("instance cube.obj --size 9 -o x.json", "cube.obj: is a mesh; leave --size out", ""),
+    ("instance cube.obj --view top -o x.json", "cube.obj: is a mesh; leave --view out", ""),
+    ("instance none.obj -o x.json", "none.obj: cannot be read: no such file", ""),
     ("draw tiny.json --kind crosses -o out.png", "", "without a field"),
     ("draw tiny.json --kind art -o out.png", "", "there is no kind of picture 'art'"),
 ]  # fmt: skip
@@ -157,30 +165,18 @@ def test_bad_input_is_refused(files, refused, arguments, begin, reason):
     assert re.search(reason, line)
 
 
-def test_a_refused_format_is_reported_and_recorded(files, capsys):
-    assert invoke(["export", "tiny.json", "-f", "minlp-parity", "-F", "lp", "-F", "nl", "-o", "out"]) == 0
-    assert "write minlp-quartic, which is the same problem" in capsys.readouterr().out
-    document = cf.read_manifest("out/tiny.minlp-parity.manifest.json").document
-    assert document["refused"].keys() == {"lp"}
-    assert not list(Path("out").glob("*.lp"))
-
-
 # Solutions
 
 
-@pytest.mark.parametrize(
-    "words, status, claim",
-    [("Infeasible", "unknown", "infeasible"), ("Time limit reached", "no-point", "limit-without-point")],
-)
-def test_solutions_without_a_point_are_refused(files, refused, instance, words, status, claim):
+WITHOUT_POINT = "Model status\nInfeasible\n\n# Primal solution values\nNone\n\n# Dual solution values\nNone\n"
+
+
+def test_solutions_without_a_point_are_refused(files, refused, instance):
     """The others: tests/export/solutions. HiGHS lists no names then, so nothing states the problem."""
-    exported = cf.write_problem(cf.formulate(instance, "milp-mccormick"), "set", formats=["nl"])
-    Path("none.sol").write_text(WITHOUT_POINT.format(words))
+    exported = cf.write(cf.formulate(instance, "milp-mccormick"), "set", formats=["nl"])
+    Path("none.sol").write_text(WITHOUT_POINT)
     line = refused("read", "none.sol", "--manifest", exported.path, "-o", "field.npz")
-    assert line.startswith(f"none.sol: holds no point: {status}; {words}; claims not kept ({claim})")
-
-
-WITHOUT_POINT = "Model status\n{}\n\n# Primal solution values\nNone\n\n# Dual solution values\nNone\n"
+    assert line.startswith("none.sol: holds no point: unknown; Infeasible; claims not kept (infeasible)")
 
 
 # The machine: missing solvers, folders that cannot be written, full disks
@@ -196,14 +192,6 @@ def in_child(*arguments, prelude=""):
 
 
 @pytest.mark.slow
-def test_another_solver_for_the_class_replaces_a_missing_one(files):
-    arguments = ["solve", "tiny.json", "-f", "milp-mccormick", "--json", "-o", "out"]
-    done = in_child(*arguments, prelude="sys.modules['highspy'] = None")
-    assert done.returncode == 0
-    assert json.loads(done.stdout)["message"].startswith("bonmin")
-
-
-@pytest.mark.slow
 def test_a_run_without_solvers_still_computes_a_field(tmp_path, files, instance):
     prelude = "sys.modules['highspy'] = sys.modules['casadi'] = None"
     arguments = ["run", "tiny.json", "--time-limit", "1", "--threads", "1", "-o", "out", "--json"]
@@ -211,36 +199,25 @@ def test_a_run_without_solvers_still_computes_a_field(tmp_path, files, instance)
     assert done.returncode == 0
     report = json.loads(done.stdout)
     assert report == json.loads((tmp_path / "out" / "report.json").read_text())
-    assert {row["method"] for row in report["methods"]} == {
-        "start", "greedy", "power", "power + QP", "polyvector", "polyvector + QP", "bend",
-        "search", "prove",
+    assert {row["method"] for row in report["methods"]} - {"prove"} == {  # for which the time may not suffice
+        "start", "greedy", "power", "power + QP", "polyvector", "polyvector + QP", "bend", "search",
     }  # fmt: skip
     assert set(report["failures"]) == {"two-stage"}
     assert all("is not installed" in reason for reason in report["failures"].values())
     assert cf.read_field(tmp_path / "out" / "field.npz").instance.sha256 == instance.sha256
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("where", ["file", "proc"])
-def test_folders_that_cannot_be_made_are_refused(tmp_path, refused, instance, where):
-    cf.write_instance(instance, tmp_path / "tiny.json")
-    cf.write_field(cf.greedy_field(instance), tmp_path / "field.npz")
-    (tmp_path / "regular").write_text("a file")
-    if where == "proc" and not Path("/proc/sys").is_dir():
+@pytest.mark.parametrize("folder", ["regular", "/proc/sys"])
+def test_folders_that_cannot_be_made_are_refused(files, refused, folder):
+    Path("regular").write_text("a file")
+    if not Path(folder).exists():
         pytest.skip("there is no /proc")
-    folder = tmp_path / "regular" if where == "file" else Path("/proc/sys")
-    for command in ("run", "export"):
-        assert refused(command, tmp_path / "tiny.json", "-o", folder / "out").startswith(
-            f"{folder / 'out'}: cannot be created"
-        )
-    line = refused("solve", tmp_path / "tiny.json", "-f", "milp-mccormick", "-o", folder / "out")
-    assert line.startswith(f"{folder / 'out'}: cannot be created")
-    for arguments in (
-        ("instance", "skew", "-o", folder / "o.json"),
-        ("draw", tmp_path / "field.npz", "-o", folder / "o.png"),
-    ):
-        line = refused(*arguments)
-        assert line.startswith((f"{arguments[-1]}: cannot be written", f"{folder}: is no folder"))
+    for command in ("run tiny.json", "export tiny.json", "solve tiny.json -f milp-mccormick"):
+        line = refused(*command.split(), "-o", f"{folder}/out")
+        assert line.startswith(f"{folder}/out: cannot be created")
+    for command in ("instance skew -o {}/o.json", "draw field.npz -o {}/o.png"):
+        line = refused(*command.format(folder).split())
+        assert line.startswith(folder)
         assert "choose another folder" in line
 
 
@@ -248,45 +225,31 @@ FULL = """import resource, signal
 signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 resource.setrlimit(resource.RLIMIT_FSIZE, ({0}, {0}))"""
 DISK = {
-    "instance": (["instance", "mouse"], "out.json", 1000),
-    "export": (["export", "mouse", "--size", "10", "-f", "milp-mccormick"], "out", 30_000),
-    "run": (["run", "mouse", "--size", "10"], "out", 30_000),
-    "draw": (["draw", "field.npz"], "out.png", 1000),
+    "instance mouse -o out.json": 1000,
+    "export mouse --size 10 -f milp-mccormick -o out": 30_000,
+    "run mouse --size 10 --time-limit 0.5 -o out": 30_000,
 }
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("case", DISK)
-def test_only_complete_files_remain_on_a_full_disk(tmp_path, monkeypatch, case):
-    arguments, output, limit = DISK[case]
+@pytest.mark.parametrize("command", DISK)
+def test_only_complete_files_and_earlier_ones_remain_on_a_full_disk(tmp_path, monkeypatch, command):
     monkeypatch.chdir(tmp_path)
-    cf.write_field(cf.greedy_field(cf.sample("mouse", 8)), "field.npz")
-    done = in_child(*arguments, "-o", output, prelude=FULL.format(limit))
+    limit, earlier = DISK[command], cf.write_instance(cf.sample("skew", 8), "out.json")
+    before = earlier.read_bytes()
+    done = in_child(*command.split(), prelude=FULL.format(limit))
     assert (done.returncode, PLAN.sub("", done.stdout)) == (1, "")
     assert complaints(done.stderr).count("\n") == 1
     assert "cannot be written: file too large; free some space" in done.stderr
-    left = [path for path in tmp_path.rglob("*") if path.is_file() and path.name not in {"field.npz", LIST}]
+    assert earlier.read_bytes() == before
+    left = [path for path in tmp_path.rglob("*") if path.is_file() and path.name not in {"out.json", LIST}]
     assert all(path.stat().st_size < limit for path in left)
-    assert not [path for path in left if path.suffix == ".part"]
-    if not Path(output).is_dir():
-        assert left == []
+    assert not [path for path in left if path.suffix == ".part" or path.name == "report.json"]
     for path in left:  # the files are complete: instances, or model files
         if path.suffix == ".json":
             json.loads(path.read_text())
         elif path.suffix == ".nl":
             assert path.read_bytes().count(b"\n") > 100
-    assert not (tmp_path / "out" / "report.json").exists()
-
-
-@pytest.mark.slow
-def test_an_existing_file_survives_a_full_disk(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    cf.write_instance(cf.sample("skew", 8), "out.json")
-    before = Path("out.json").read_bytes()
-    done = in_child("instance", "mouse", "-o", "out.json", prelude=FULL.format(1000))
-    assert done.returncode == 1
-    assert Path("out.json").read_bytes() == before
-    assert {path.name for path in tmp_path.iterdir()} == {"out.json", LIST}
 
 
 @pytest.mark.slow

@@ -13,10 +13,8 @@ from pathlib import Path
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.library.plan.spec import read_spec
 from crossfield.models import input_limits
-from crossfield.models.array_archive import ArrayArchive, ExpectedArray, pack_arrays
-from crossfield.models.errors import LONGEST, CrossfieldError, InputError, InstanceError, printable, shortened
+from crossfield.models.array_archive import pack_arrays
 from crossfield.models.instance.file import instance_arrays
 from crossfield.models.sketch.svg import read_svg
 from PIL import Image
@@ -40,16 +38,16 @@ COSTLY_SVG = {
         for text in ("a", "@", "{", "/*", " ", "(", "a;", "@a{", "\\", '"')
     },
     "a selector of many": styled(",".join(f".c{k}" for k in range(20_000)) + "{stroke:red}"),
-    "uses of one path": drawn(f'<path id="p" stroke="black" d="M0 0{ZIGZAG}"/>' + '<use href="#p"/>' * 2000),
+    "uses of one path": drawn(f'<path id="p" stroke="black" d="M0 0{ZIGZAG}"/>' + '<use href="#p"/>' * 400),
     "rules and paths": SVG.format(
-        "<style>" + "".join(f".c{k}{{stroke:red}}" for k in range(5000)) + "</style>"
-        + "".join(f'<path class="c{k}" d="M5 5 L{k % 55} 35"/>' for k in range(5000))
+        "<style>" + "".join(f".c{k}{{stroke:red}}" for k in range(2000)) + "</style>"
+        + "".join(f'<path class="c{k}" d="M5 5 L{k % 55} 35"/>' for k in range(2000))
     ).encode(),
     "rules of one class": SVG.format(
         "<style>" + "".join(f".d{k}.c{{stroke:red}}" for k in range(5000)) + "</style>"
         + "".join(f'<path class="c e{k}" d="M5 5 L{k % 55} 35"/>' for k in range(5000))
     ).encode(),
-    "closed subpaths": drawn('<path stroke="black" d="M5 5' + "L3 4z" * 20_000 + '"/>'),
+    "closed subpaths": drawn('<path stroke="black" d="M5 5' + "L3 4z" * 10_000 + '"/>'),
     "a point list without blanks": drawn('<polyline stroke="black" points="' + "1" * 100_000 + '"/>'),
     "a colour of digits": drawn('<path stroke="rgb(' + "1" * 50_000 + '" d="M5 5L9 9"/>'),
     "a transform that never closes": drawn(
@@ -71,6 +69,10 @@ COSTLY_SVG = {
     "selectors of many ancestors": SVG.format(
         "<style>" + "".join(f"g g g g g path.c{k % 7}{{stroke:red}}" for k in range(2000)) + "</style>"
         + "<g>" * 40 + '<path class="c0 c1 c2" d="M5 5 L50 35"/>' * 2000 + "</g>" * 40
+    ).encode(),
+    "selectors of alternatives": SVG.format(
+        "<style>:is(q * * * *, r) * * *{stroke:red}</style>"
+        + "<g>" * 40 + '<path d="M5 5 L50 35"/>' * 20 + "</g>" * 40
     ).encode(),
     "variables of variables": styled(
         "svg{" + "".join(f"--a{k + 1}:var(--a{k})var(--a{k});" for k in range(40)) + "--a0:red}"
@@ -166,7 +168,7 @@ def test_costly_drawings_are_read_or_refused_in_little_time(tmp_path):
     assert set(refused) == {
         "rules of one class", "a point list without blanks", "a colour of digits",
         "a transform that never closes", "uses of uses", "opacities of pages", "masks of many",
-        "masks of uses of uses", "selectors of many ancestors",
+        "masks of uses of uses", "selectors of many ancestors", "selectors of alternatives",
     }  # fmt: skip
     assert f"more than {input_limits.MAX_LAYERS} clips" in refused["opacities of pages"]
     assert f"more than {input_limits.MAX_ELEMENTS} elements" in refused["masks of uses of uses"]
@@ -179,8 +181,8 @@ def test_costly_drawings_are_read_or_refused_in_little_time(tmp_path):
 def test_small_files_do_not_take_much_memory(tmp_path):
     """The picture comes last, because the memory is measured for the whole process."""
     files = {
-        "extra.npz": archive_with("extra", (1 << 29,), "|u1", 1 << 29),
-        "mask.npz": archive_with("mask", (20_000, 40_000), "|b1", 800 << 20),
+        "extra.npz": archive_with("extra", (1 << 27,), "|u1", 1 << 27),
+        "mask.npz": archive_with("mask", (20_000, 10_000), "|b1", 200 << 20),
         "strokes.json": repeated_strokes(tmp_path),
         "many.scap": b"#60\t40\n@1\n{\n#1\t1\n" + b"1\t2\t1\n3\t4\t1\n" * 1_000_000 + b"}\n",
         "big.png": png(8900),
@@ -192,7 +194,7 @@ def test_small_files_do_not_take_much_memory(tmp_path):
     assert messages["big.png"] == ""
     assert "holds an array 'extra' that does not belong in it" in messages["extra.npz"]
     assert (
-        "array 'mask' has shape (20000, 40000); expected 2 dimensions of at most 9999" in messages["mask.npz"]
+        "array 'mask' has shape (20000, 10000); expected 2 dimensions of at most 9999" in messages["mask.npz"]
     )
     assert "lists 300000 stroke pixels, but its mask has 4 pixels" in messages["strokes.json"]
     assert f"more than {input_limits.MAX_LINES} lines" in messages["many.scap"]
@@ -228,7 +230,7 @@ def test_strange_shapes_are_read_as_browsers_do_or_refused_where_nothing_is_left
     for shape, expected in STRANGE_SVG.values():
         drawing = SVG.format(shape).encode()
         if isinstance(expected, str):
-            with pytest.raises(InputError, match=re.escape(expected)):
+            with pytest.raises(cf.InputError, match=re.escape(expected)):
                 read_svg(drawing)
         else:
             points = read_svg(drawing).points
@@ -253,32 +255,17 @@ def test_a_faulty_shape_is_noted_by_its_name_and_the_others_are_read():
     )
 
 
-def test_pages_without_extent_are_refused(tmp_path):
-    for name, content in (
-        ("a.scap", "#1e-320\t1\n{\n1\t2\t1\n3\t4\t1\n}\n"),
-        ("a.svg", SVG.replace("60 40", "1e-320 40").format(STROKES)),
-    ):
-        (tmp_path / name).write_text(content)
-        with pytest.raises(InputError, match="1e-320"):
-            cf.read_sketch(tmp_path / name)
-
-
-def test_numbers_of_thousands_of_digits_in_a_specification_are_refused(tmp_path):
-    head = (
-        'format = "crossfield-library-spec"\nversion = 1\ntitle = "t"\n'
-        '[[sketches]]\nname = "a"\nsample = "mouse"\n'
-    )
-    for number in ("9" * 5000, "9" * 4000, "0x" + "f" * 5000):
-        (tmp_path / "spec.toml").write_text(f"{head}[rungs.tiny]\nsizes = [{number}]\n")
-        with pytest.raises(InputError, match=r"spec\.toml: ") as caught:
-            read_spec(tmp_path / "spec.toml")
-        assert len(str(caught.value)) < 500
-
-
-def test_floating_point_pictures_are_refused(tmp_path):
+def test_pages_without_extent_and_floating_point_pictures_are_refused(tmp_path):
+    (tmp_path / "a.scap").write_text("#1e-320\t1\n{\n1\t2\t1\n3\t4\t1\n}\n")
+    (tmp_path / "a.svg").write_text(SVG.replace("60 40", "1e-320 40").format(STROKES))
     Image.fromarray(np.ones((40, 60), dtype=np.float32)).save(tmp_path / "a.tiff")
-    with pytest.raises(InputError, match="floating point; save it with 8 or 16 bits"):
-        cf.read_sketch(tmp_path / "a.tiff")
+    for suffix, words in (
+        ("scap", "1e-320"),
+        ("svg", "1e-320"),
+        ("tiff", "floating point; save it with 8 or"),
+    ):
+        with pytest.raises(cf.InputError, match=words):
+            cf.read_sketch(tmp_path / f"a.{suffix}")
 
 
 def test_damaged_tiffs_are_refused(tmp_path):
@@ -294,7 +281,7 @@ def test_damaged_tiffs_are_refused(tmp_path):
             (tmp_path / "a.tiff").write_bytes(damaged[: len(damaged)])
             try:
                 cf.read_sketch(tmp_path / "a.tiff", size=6)
-            except CrossfieldError:
+            except cf.CrossfieldError:
                 refused += 1
     assert refused
 
@@ -332,48 +319,35 @@ HEADERS = {
     "the old name of a kind": "{'descr': 'a8', 'fortran_order': False, 'shape': (3,), }",
     "too much": "{'descr': '<f8', 'fortran_order': False, 'shape': (" + 5000 * "3, " + "), }",
     "nothing": "",
+    "control characters": "{'descr': '" + 300 * "\x1b[31m\x07" + "'}",
 }
 
 
 @pytest.mark.parametrize("header", HEADERS.values(), ids=HEADERS)
-def test_damaged_headers_are_refused_without_a_warning(tmp_path, header):
+def test_damaged_headers_are_refused_in_a_short_line_and_without_a_warning(tmp_path, header):
     """Warnings are errors in tests, so a warning would change the message."""
-    buffer = io.BytesIO()
-    packed = f"{header}\n".encode()
-    with zipfile.ZipFile(buffer, "w") as archive:
-        content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(packed)) + packed + bytes(24)
-        archive.writestr("u.npy", content)
-    with pytest.raises(InstanceError, match="no header as NumPy writes it"):
-        ArrayArchive(buffer.getvalue()).arrays({"u": ExpectedArray(1, 10)})
+    arrays = {name: array for name, array in instance_arrays(instance()).items() if name != "w"}
+    buffer, packed = io.BytesIO(pack_arrays(arrays)), f"{header}\n".encode()
+    with zipfile.ZipFile(buffer, "a") as archive:
+        content = b"\x93NUMPY\x01\x00" + struct.pack("<H", len(packed)) + packed + bytes(16)
+        archive.writestr("w.npy", content)
+    (tmp_path / "a.npz").write_bytes(buffer.getvalue())
+    with pytest.raises(cf.InstanceError, match=r"a\.npz: .* 'w' has no header as NumPy writes") as caught:
+        cf.read_instance(tmp_path / "a.npz")
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < len(str(tmp_path)) + 200
 
 
 def test_texts_from_files_are_safe_in_messages(tmp_path):
     strange = "a\x1b[31m\u202eb\u200b\x07\x9b\udcffc\u2028d"
-    assert printable(strange) == r"a\x1b[31m\u202eb\u200b\x07\x9b\udcffc d"
-    assert printable("Öl – 12.3° 図") == "Öl – 12.3° 図"
-    assert len(shortened("x" * 10_000)) == 80
-    assert len(shortened("\x1b" * 10_000)) == 80
-    assert "thousands of digits" in shortened(1 << 20_000)
-    error = InputError(f"{strange}{'long ' * 10_000}; write it again", file=tmp_path / "a\u202eb.svg")
+    assert str(cf.InputError(strange)) == r"a\x1b[31m\u202eb\u200b\x07\x9b\udcffc d"
+    assert str(cf.InputError("Öl – 12.3° 図")) == "Öl – 12.3° 図"
+    error = cf.InputError(f"{strange}{'long ' * 10_000}; write it again", file=tmp_path / "a\u202eb.svg")
     assert str(error).isprintable()
     assert str(error).endswith("; write it again")
     assert r"a\u202eb.svg: " in str(error)
-    assert len(str(InputError("word " * 10_000))) == LONGEST
-    assert str(InputError(str(error))).endswith("; write it again")
-    assert str(InputError(printable(strange))) == printable(strange)
-
-
-def test_the_error_for_a_damaged_archive_is_short(tmp_path):
-    whole = instance_arrays(instance())
-    arrays = io.BytesIO(pack_arrays({name: array for name, array in whole.items() if name != "w"}))
-    with zipfile.ZipFile(arrays, "a") as archive:
-        header = b"{'descr': '" + b"\x1b[31m\x07" * 300 + b"'}\n"
-        archive.writestr("w.npy", b"\x93NUMPY\x01\x00" + struct.pack("<H", len(header)) + header)
-    (tmp_path / "a.npz").write_bytes(arrays.getvalue())
-    with pytest.raises(CrossfieldError) as caught:
-        cf.read_instance(tmp_path / "a.npz")
-    assert str(caught.value).isprintable()
-    assert len(str(caught.value)) < len(str(tmp_path)) + 200
+    assert len(str(error)) < 3000
+    assert str(cf.InputError(str(error))).endswith("; write it again")
 
 
 def test_fields_of_numbers_that_are_no_angles_are_refused(tmp_path):
@@ -384,24 +358,14 @@ def test_fields_of_numbers_that_are_no_angles_are_refused(tmp_path):
         changed = json.loads(json.dumps(document))
         changed["pixels"][1][column] = value
         (tmp_path / "b.json").write_text(json.dumps(changed))
-        with pytest.raises(CrossfieldError):
+        with pytest.raises(cf.CrossfieldError):
             cf.read_field(tmp_path / "b.json")
 
 
 def test_output_is_escaped_on_a_terminal_without_unicode(tmp_path):
-    """Reports contain a degree sign, and drawings may have any name."""
+    """Drawings may have any name."""
     (tmp_path / "Skizze – 図.svg").write_text(SVG.format(STROKES))
     environment = {**os.environ, "PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
-    program = (
-        "from crossfield.export.cli.output import escape_unencodable, print_line, print_notice, show_table\n"
-        "escape_unencodable(); print_line('12.3°'); print_notice('12.3°')\n"
-        "show_table('°', ('|β|',), [['1.4°']])"
-    )
-    done = subprocess.run([sys.executable, "-c", program], check=False, capture_output=True, env=environment)
-    assert done.returncode == 0
-    assert done.stdout.startswith(b"12.3")
-    assert rb"1.4\xb0" in done.stdout
-    assert done.stderr.startswith(b"crossfield: 12.3")
     command = [sys.executable, "-m", "crossfield", "instance", tmp_path / "Skizze – 図.svg", "--size", "8"]
     for output, code in (("ö.json", 0), ("ö.txt", 1)):
         done = subprocess.run(

@@ -3,60 +3,44 @@
 import json
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.cli.mesh_options import SKETCHES_ONLY
 from loops import for_each
-from meshes import box, flat_sheet, write_obj
-
-
-@pytest.fixture(autouse=True)
-def files(tmp_path, monkeypatch):
-    """The .obj of a cube, its instance, and a field on it, in the current folder."""
-    monkeypatch.chdir(tmp_path)
-    write_obj(Path("cube.obj"), box())
-    instance = cf.read_mesh("cube.obj", sharp=35)
-    cf.write_instance(instance, "cube.json")
-    cf.write_field(cf.CrossField.from_lines(instance, np.zeros(12), np.full(12, np.pi / 2)), "start.json")
-
+from meshes import box, flat_sheet, mesh_of, write_obj
 
 EXPORT = """
 import resource, sys
 from crossfield.export.cli.app import invoke
-code = invoke(["export", "sheet.obj", "-f", "milp", "-F", "mps", "-o", "out", "-q"])
+code = invoke(["export", "sheet.obj", "-f", "milp", "-F", "mps", "-o", "out"])
 print(code, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """
 
 
 @pytest.mark.slow
-def test_a_mesh_of_100000_faces_is_exported_within_30_seconds_and_2_gigabytes():
+def test_a_mesh_of_100000_faces_is_exported_within_2_gigabytes(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     write_obj(Path("sheet.obj"), flat_sheet(224, 224))
-    begin = time.monotonic()
     shown = subprocess.run([sys.executable, "-c", EXPORT], capture_output=True, text=True, check=True).stdout
-    code, kilobytes = map(int, shown.split())
+    code, kilobytes = map(int, shown.splitlines()[-1].split())
     assert code == 0
-    assert time.monotonic() - begin < 30
     assert kilobytes < 2e6
 
 
-def line_of(capsys):
-    shown = capsys.readouterr().err
-    assert shown.count("\n") == 1
-    return shown
-
-
 @for_each("crosses", ["orthogonal", "skewed"])
-def test_a_mesh_is_exported_verified_solved_and_read(crosses, capsys):
+def test_a_mesh_is_exported_verified_solved_and_read(crosses, tmp_path, monkeypatch, capsys):
     """Crosses along all edges of a cube have the energy 0, and a singularity at each corner."""
+    monkeypatch.chdir(tmp_path)
+    write_obj(Path("cube.obj"), box())
     capsys.readouterr()
-    assert invoke(["instance", "cube.obj", "--sharp", "35", "--crosses", crosses, "-o", "i.json"]) == 0
+    options = ["--sharp", "35", "--crosses", crosses, "--stroke-weight", "3"]
+    assert invoke(["instance", "cube.obj", *options, "-o", "i.json"]) == 0
     assert ("orthogonal" in capsys.readouterr().out) == (crosses == "orthogonal")
     instance = cf.read_instance("i.json")
+    assert instance.stroke_weight == pytest.approx(3)
     start = cf.CrossField.from_lines(instance, np.zeros(12), np.full(12, np.pi / 2))
     cf.write_field(start, "s.json")
     formats = [word for name in ("lp", "mps", "nl", "mod") for word in ("-F", name)]
@@ -75,28 +59,70 @@ def test_a_mesh_is_exported_verified_solved_and_read(crosses, capsys):
         assert field.singularities.index.tolist() == [0.25] * 8
 
 
-def test_the_options_of_a_mesh_and_of_a_sketch_are_kept_apart(capsys):
-    for arguments, message in (
-        (["mouse", "--sharp", "35"], "mouse: is no mesh file; leave --sharp, --directions and --weights out"),
-        (["cube.json", "--weights", "dual"], "cube.json: is no mesh file"),
-        (["cube.obj", "--size", "9"], "cube.obj: is a mesh; leave out the options that read a sketch"),
-        (["cube.obj", "--view", "top"], "cube.obj: is a mesh; leave out the options that read a sketch"),
-        (["none.obj"], "none.obj: cannot be read: no such file"),
-    ):
-        assert invoke(["instance", *arguments, "-o", "x.json"]) == 1
-        assert message in line_of(capsys)
-    assert invoke(["instance", "cube.obj", "--stroke-weight", "3", "-o", "x.npz"]) == 0
-    assert cf.read_instance("x.npz").stroke_weight == 3
-    assert invoke(["instance", "mouse", "--size", "8", "--crosses", "orthogonal", "-o", "x.json"]) == 0
-    assert cf.read_instance("x.json").orthogonal
+@for_each(
+    "words,options",
+    [
+        ("--no-boundary", {"boundary": False}),
+        ("--boundary --sharp 30 --weights dual", {"sharp": 30, "weights": "dual"}),
+        ("--sharp 1e-9 --sharp-weight 0.5", {"sharp": 1e-9, "sharp_weight": 0.5}),
+    ],
+)
+def test_options_of_meshes_are_those_of_read_mesh(words, options, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_obj(Path("sheet.obj"), flat_sheet(2, 2))
+    assert invoke(["instance", "sheet.obj", *words.split(), "-o", "i.json"]) == 0
+    assert cf.read_instance("i.json").sha256 == cf.read_mesh("sheet.obj", **options).sha256
 
 
-@for_each("command", SKETCHES_ONLY)
-def test_commands_for_pixels_refuse_meshes_in_one_line(command, capsys):
-    output = [] if command == "studio" else ["-o", "x.png" if command == "draw" else "x"]
-    sources = {"draw": ["start.json", "cube.json"], "studio": ["cube.obj"]}
-    for source in sources.get(command, ["cube.obj", "cube.json"]):
-        assert invoke([command, source, *output]) == 1
-        assert "mesh" in line_of(capsys)
-    assert not Path("x").exists()
-    assert not Path("x.png").exists()
+def test_sharp_edges_are_written_for_quadwild_and_read_back(tmp_path, monkeypatch):
+    """A sheet folded into a step: its first inner edge is concave, its second one convex."""
+    monkeypatch.chdir(tmp_path)
+    vertices = [[x, y, z] for x, z in ((0, 0), (1, 0), (1, 1), (2, 1)) for y in (0, 1)]
+    faces = [corners for k in (0, 2, 4) for corners in ([k, k + 2, k + 3], [k, k + 3, k + 1])]
+    write_obj(Path("step.obj"), mesh_of(vertices, faces))
+    assert invoke(["instance", "step.obj", "--sharp", "35", "-o", "step.sharp"]) == 0
+    count, *rows = Path("step.sharp").read_text().split()
+    inner = ["0,0,1", "1,2,1", "0,3,2", "1,5,2"]
+    assert int(count) == len(rows) == 12
+    assert [row for row in rows if row in inner] == inner
+    assert sum(row[0] == "0" for row in rows) == 2
+    again = cf.read_mesh("step.obj", boundary=False, directions="step.sharp")
+    assert again.sha256 == cf.read_mesh("step.obj", sharp=35).sha256
+    assert invoke(["instance", "step.obj", "-o", "step.json"]) == 0
+    assert invoke(["instance", "step.json", "-o", "again.sharp"]) == 1
+
+
+def test_singularities_of_a_file_are_prescribed_in_models_and_kept_by_answers(tmp_path, monkeypatch, capsys):
+    """The corners of a cube without its first one, whose index goes to the middle of its top."""
+    monkeypatch.chdir(tmp_path)
+    write_obj(Path("cube.obj"), box(2))
+    assert invoke(["instance", "cube.obj", "--sharp", "35", "-o", "i.json"]) == 0
+    instance = cf.read_instance("i.json")
+    corners = np.nonzero(np.isin(instance.mesh.vertices, (0, 1)).all(axis=1))[0].tolist()
+    top = instance.mesh.vertices.tolist().index([0.5, 0.5, 1])
+    rows = [f"{corners[0]} 0", f"{top} 1", *(f"{corner} 1" for corner in corners[1:])]
+    Path("wanted.sings").write_text("\n".join(["4 9", *rows]) + "\n")
+    for folder in ("out", "again"):
+        assert invoke(["export", "i.json", "--indices", "wanted.sings", "-o", folder]) == 0
+    assert [path.name for path in sorted(Path("out").glob("*.lp"))] == [
+        "cube.milp-cycle.lp",
+        "cube.miqp-cycle.lp",
+    ]
+    assert all(
+        path.read_bytes() == (Path("again") / path.name).read_bytes() for path in Path("out").glob("c*")
+    )
+    assert invoke(["verify", "out", "-p", "highs", "-p", "casadi"]) == 0
+    problem = cf.read_manifest("out/cube.milp-cycle.manifest.json").problem()
+    field = cf.solve(problem, "highs").field
+    cf.write_field(field, "field.rawfield")
+    written = Path("field.sings").read_text().splitlines()
+    assert {*rows[1:]} <= {*written[1:]}
+    assert not any(row.startswith(f"{corners[0]} ") for row in written[1:])
+    capsys.readouterr()
+    for text, message in (("4 1\n", "4 0, the number"), ("5 0\n", "4 0"), ("4 1\n3 x\n", "line 2")):
+        Path("wrong.sings").write_text(text)
+        assert invoke(["export", "i.json", "--indices", "wrong.sings", "-o", "wrong"]) == 1
+        assert message in capsys.readouterr().err
+    refused = ["export", "i.json", "-f", "milp", "--indices", "wanted.sings", "-o", "wrong"]
+    assert invoke(refused) == 1
+    assert "milp-mccormick has no option indices" in capsys.readouterr().err

@@ -9,66 +9,51 @@ import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.models.array_archive import pack_arrays
-from crossfield.models.field.file import read_field
 from crossfield.models.proof.checkers import check_certificate
 from folders import contents
 
 
-def write_instance(folder, size, weight):
-    """The path of an instance of the mouse."""
-    return str(cf.write_instance(cf.sample("mouse", size, stroke_weight=weight), folder / "mouse.json"))
+def prove(folder, size, weight, *options):
+    """Write a proof of the mouse to a folder; return its report, field and path of the certificate."""
+    instance = cf.write_instance(cf.sample("mouse", size, stroke_weight=weight), folder / "mouse.json")
+    command = ["prove", str(instance), "-o", str(folder / "out"), "--time-limit", "100", *options]
+    assert invoke(command) == 0
+    assert contents(folder / "out").keys() == {
+        f"mouse.proof.{suffix}" for suffix in ("certificate.npz", "field.npz", "json")
+    }
+    report = json.loads((folder / "out" / "mouse.proof.json").read_text())
+    field = cf.read_field(folder / "out" / "mouse.proof.field.npz")
+    return report, field, folder / "out" / report["describes"]
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    """Folder that `prove` wrote for a small sample, and its report."""
-    folder = tmp_path_factory.mktemp("proof")
-    instance = write_instance(tmp_path_factory.mktemp("instance"), 8, 0.3)
-    command = ["prove", instance, "-o", str(folder), "--time-limit", "100", "-q"]
-    assert invoke(command) == 0
-    (report,) = folder.glob("*.proof.json")
-    return folder, json.loads(report.read_text())
+def proven(tmp_path_factory):
+    return prove(tmp_path_factory.mktemp("proof"), 8, 0.3)
 
 
-def of(folder, suffix):
-    (path,) = folder.glob(f"*.proof.{suffix}")
-    return path
-
-
-def test_field_certificate_and_report_agree(folder):
-    folder, report = folder
-    field = read_field(of(folder, "field.npz"))
-    assert report["status"] == "optimal"
-    assert report["ended"] == "optimal"
+def test_field_certificate_and_report_agree(proven):
+    report, field, certificate = proven
+    assert report["status"] == report["ended"] == "optimal"
+    assert certificate.name == "mouse.proof.certificate.npz"
     assert report["energy"] == pytest.approx(field.energy().total, abs=1e-12)
     assert report["bound"] == pytest.approx(report["energy"], abs=1e-8)
     assert report["forced_jumps"] == report["pairs"] == len(field.p)
     assert all(level["bound"] <= report["energy"] for level in report["levels"])
-    assert sorted(name.split(".", 1)[1] for name in contents(folder)) == [
-        "proof.certificate.npz",
-        "proof.field.npz",
-        "proof.json",
-    ]
 
 
 def test_a_proof_in_the_1_norm_is_checked_with_its_norm(tmp_path, capsys):
-    instance = write_instance(tmp_path, 4, 0.2)
-    command = ["prove", instance, "--norm", "1", "--time-limit", "100", "--json"]
-    assert invoke([*command, "-o", str(tmp_path)]) == 0
-    report = json.loads(capsys.readouterr().out)
-    assert invoke(["prove", "--check", str(of(tmp_path, "certificate.npz")), "--json"]) == 0
+    report, field, certificate = prove(tmp_path, 4, 0.2, "--norm", "1")
+    capsys.readouterr()
+    assert invoke(["prove", "--check", str(certificate), "--json"]) == 0
     assert json.loads(capsys.readouterr().out).items() <= report.items()
-    field = read_field(of(tmp_path, "field.npz"))
     assert (report["norm"], report["status"]) == (1, "optimal")
     assert report["energy"] == pytest.approx(field.energy(1).total, abs=1e-12)
 
 
-def test_certificates_are_checked(folder, capsys, tmp_path):
-    folder, report = folder
-    certificate = of(folder, "certificate.npz")
+def test_certificates_are_checked(proven, capsys, tmp_path):
+    report, _, certificate = proven
     assert invoke(["prove", "--check", str(certificate), "--json"]) == 0
-    document = json.loads(capsys.readouterr().out)
-    assert document.items() <= report.items()
+    assert json.loads(capsys.readouterr().out).items() <= report.items()
     assert invoke(["prove", "--check", str(certificate)]) == 0
     assert "the certificate is valid" in capsys.readouterr().out
     command = [sys.executable, "-I", check_certificate.__file__, str(certificate)]

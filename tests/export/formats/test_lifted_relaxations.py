@@ -5,65 +5,56 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.bundle.problem_files import write_all
-from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.solving.local import choose_solver
 from crossfield.export.verify.checks import Verdict
 from crossfield.export.verify.verify import judge_solves, verify
 
-LIFTED = ("minlp-quartic", "minlp-cubic")
+RELAXED = {"relax": True}
 
 
 @pytest.fixture(scope="module")
 def two():
     """Two pixels whose strokes pull p1 between 0 and 1, where the hull of the product is larger than it."""
     mask, pixels = np.ones((1, 2), dtype=bool), [[0, 0], [0, 1]]
-    return cf.Instance.on_pixels(
-        "two", mask, pixels, [0.5, 2.2], [1.0, 1.0], skew_coefficient=1.0, gauge="box"
-    )
+    strokes = pixels, [0.5, 2.2], [1.0, 1.0]
+    return cf.Instance.on_pixels("two", mask, *strokes, skew_coefficient=1.0, gauge="box")
 
 
-@pytest.fixture(scope="module")
-def written(two, tmp_path_factory):
-    folder = tmp_path_factory.mktemp("relaxed")
-    manifests = write_all(
-        two,
-        folder,
-        formulations=[*LIFTED, "minlp-parity"],
-        formats=["nl", "lp", "mps", "qplib"],
-        options={"relax": True},
-    )
-    return {manifest.formulation: manifest for manifest in manifests}
+@pytest.mark.parametrize("name", ["minlp-quartic", "minlp-cubic"])
+def test_a_lifted_relaxation_is_called_one_and_whole_jumps_exact(name, two, tmp_path):
+    for relax, right, wrong in ((True, "a relaxation", "exact"), (None, "exact", "a relaxation")):
+        problem = cf.formulate(two, name, relax=relax)
+        for suffix in ("nl", "lp", "mps", "qplib"):
+            path = tmp_path / f"{relax}.{suffix}"
+            lifted = cf.write(problem, path).lifted
+            if suffix == "nl":
+                assert lifted == ""
+                continue
+            head = "\n".join(path.read_text().splitlines()[:6])
+            assert right in lifted
+            assert right in head
+            assert wrong not in lifted + head
+            assert (f"continuous relaxation of {name}" in head) == bool(relax)
 
 
-@pytest.mark.parametrize("name", LIFTED)
-def test_a_lifted_relaxation_is_called_one(name, written):
-    manifest = written[name]
-    for file in manifest.document["files"]:
-        if file["format"] == "nl":
-            assert file["lifted"] == ""
-            continue
-        assert "a relaxation" in file["lifted"]
-        assert "exact" not in file["lifted"]
-        head = (manifest.folder / file["name"]).read_text().splitlines()[:6]
-        assert any("a relaxation" in line for line in head)
-        assert not any("exact" in line for line in head)
-        assert any(f"continuous relaxation of {name}" in line for line in head)
-
-
-def test_no_other_relaxation_is_called_the_same_problem(written):
+def test_no_other_relaxation_is_called_the_same_problem(two, tmp_path):
     """cos(pi p) between whole p is another function than (1 - 2 p1)."""
-    reasons = written["minlp-parity"].document["refused"]
+    formats = ["nl", "lp", "mps", "qplib"]
+    (manifest,) = cf.write_all(two, tmp_path, formulations=["minlp-parity"], formats=formats, options=RELAXED)
+    reasons = manifest.document["refused"]
     assert sorted(reasons) == ["lp", "mps", "qplib"]
-    for reason in reasons.values():
-        assert "same problem" not in reason
-        assert "choose nl or gms" in reason
+    assert not any("same problem" in reason for reason in reasons.values())
 
 
-def test_the_hull_is_larger(two):
-    """The lifted point, p1 = 1/2 and z off p1 beta_i, is feasible and lower than any of the products."""
+def test_the_hull_is_larger_and_a_solver_is_chosen_that_reads_the_products(two):
+    """The lifted point, p1 = 1/2 and z off p1 beta_i, is feasible and lower than any of the products.
+
+    HiGHS solves the weaker problem of the .mps on request only, and the facts state it.
+    """
     problem = cf.formulate(two, "minlp-quartic", relax=True)
+    assert choose_solver(problem).formats[0] == "nl"
     lifted = cf.solve(problem, "highs")
+    assert "a relaxation" in lifted.problem.formulation.lifted
     assert lifted.violation.worst < 1e-6
     assert lifted.objective == pytest.approx(0.198, abs=1e-3)
     z, p1, beta = (lifted.point[lifted.problem.blocks[name].slice] for name in ("z", "p1", "beta"))
@@ -74,26 +65,17 @@ def test_the_hull_is_larger(two):
 
 def starts(instance):
     """Fields at every jump that the pair may have."""
-    p_min, p_max = int(instance.p_min[0]), int(instance.p_max[0])
-    for p in range(p_min, p_max + 1):
-        yield cf.CrossField(instance, (instance.alpha_lower + instance.alpha_upper) / 2, np.zeros(2), [p])
-
-
-def test_a_solver_is_chosen_that_reads_the_products(two):
-    """HiGHS would solve the weaker problem of the .mps; it does so on request, and the facts state it."""
-    problem = cf.formulate(two, "minlp-quartic", relax=True)
-    assert choose_solver(problem).formats[0] == "nl"
-    assert "a relaxation" in cf.solve(problem, "highs").problem.formulation.lifted
-    assert (
-        problem_in_format(cf.formulate(two, "minlp-quartic"), FORMATS["mps"]).formulation.is_weakened is False
-    )
+    middle = (instance.alpha_lower + instance.alpha_upper) / 2
+    for p in range(int(instance.p_min[0]), int(instance.p_max[0]) + 1):
+        yield cf.CrossField(instance, middle, np.zeros(2), [p])
 
 
 @pytest.mark.slow
 @pytest.mark.needs("scip")
-def test_verify_compares_optima_across_formats(written, two, tmp_path):
+def test_verify_compares_optima_across_formats(two, tmp_path):
     """SCIP finds 0.247 on the .nl, HiGHS proves 0.198 on the .mps: a relaxation, not another optimum."""
-    write_all(two, tmp_path, formulations=["minlp-quartic"], formats=["nl", "mps"], options={"relax": True})
+    options = {"formulations": ["minlp-quartic"], "formats": ["nl", "mps"], "options": RELAXED}
+    cf.write_all(two, tmp_path, **options)
     verification = verify(tmp_path, seconds=4.0, programs=["scip", "highs"])
     assert verification.failed_checks == []
     solves = {f.file.rpartition(".")[2]: f for f in verification.checks if f.step == "solve" and f.objective}

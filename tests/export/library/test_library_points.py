@@ -1,237 +1,264 @@
-"""Given points of a specification: a build with them does not search and is the same everywhere."""
+"""Points and certificates of a library: found, or given by its specification; entries that they tighten."""
 
 import json
-import os
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
+import crossfield as cf
 import pytest
-from crossfield.export.library.building.build import build
-from crossfield.export.library.building.verification import verify_library
-from crossfield.export.library.documents.documents import read_about, read_library
-from crossfield.export.library.ledger.grades import EASY, difficulty
-from crossfield.export.library.ledger.known_points import ROLES, read_points
-from crossfield.export.library.ledger.ledger import Record
-from crossfield.export.library.plan.instances import make_instance
-from crossfield.export.library.plan.recipe import NORMS, plan_library
-from crossfield.export.library.plan.spec import default_spec, read_spec
-from crossfield.models.errors import InputError
-from libraries import content, improve, library_of, spec_of
-from processors import PROCESSORS
+from children import complaints
+from crossfield.export.cli.app import invoke
+from crossfield.export.library.building import fields
+from forging import change
+from libraries import content, defects, document, improve, library_of, problem, write_spec
 
-pytestmark = pytest.mark.usefixtures("short_searches")
-
-SPEC = """[rungs.tiny]
+SPEC = """formulations = ["milp", "exact", "qp"]
+[rungs.tiny]
 sizes = [3]
+formats = ["mps"]
 gauges = ["strokes", "box"]
-facets = ["hull", "printed"]
-compress = true
-
+tightened = ["exact", "milp"]
 [[sketches]]
 name = "rand"
 random = "full"
-seeds = [1]
-
-[[sketches]]
-name = "saddle"
-sample = "saddle"
-sizes = { tiny = [4] }
+seeds = "7-8"
+share = 0.3
+points = "proven"
 """
-SEARCHED = """formulations = ["qp-fixed", "miqp-exact"]
-
-[rungs.tiny]
-sizes = [4]
-formats = ["mps"]
-
-[[sketches]]
-name = "saddle"
-sample = "saddle"
-"""
-STEM, SADDLE = "cf_rand_n003_s1", "cf_saddle_n004_box"
+GIVEN = 'points = "known"\n' + SPEC
+ONE = GIVEN.replace("7-8", "7-7").replace(', "box"', "")
+STEM, OTHER = "cf_rand_n003_s7", "cf_rand_n003_s8"
+CERTIFICATES = {"exact": f"{STEM}.certificate.npz", "milp": f"{STEM}.l1.certificate.npz"}
+GAP = "states another norm, status, bound or energy"
 
 
-def worsened(path):
-    """State the greedy field as the best known one, and return its 2-norm energy."""
-    about = read_about(path)
-    poor = about["fields"]["baseline"]
-    assert poor["energy_2norm"] > about["fields"]["least_2"]["energy_2norm"] + 1e-6
-    about["fields"] = dict.fromkeys(ROLES, poor)
-    path.write_text(json.dumps(about))
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """A library with proofs; not to be changed."""
+    return library_of(tmp_path_factory.mktemp("proven"), SPEC).folder
+
+
+@pytest.fixture
+def lib(built, tmp_path):
+    """A copy that a test may change, as the library of a specification and as points of another one."""
+    shutil.copytree(built, tmp_path / "known")
+    return shutil.copytree(built, tmp_path / "lib")
+
+
+def instance_of(lib, stem=STEM):
+    return cf.read_instance(lib / f"{stem}.instance.json")
+
+
+def make_poor(lib):
+    """State the greedy field as the best one known, without a certificate; return its 2-norm energy."""
+    about = document(lib, f"{STEM}.about")
+    poor, best = about["fields"]["baseline"], about["fields"]["least_2"]
+    assert poor["energy_2norm"] > best["energy_2norm"] + 1e-6
+    about["fields"] = dict.fromkeys(about["fields"], poor)
+    del about["certificates"]
+    (lib / f"{STEM}.about.json").write_text(json.dumps(about))
     return poor["energy_2norm"]
 
 
-@pytest.fixture(scope="module")
-def searched(tmp_path_factory):
-    """A library whose points were searched for; not to be changed."""
-    return library_of(tmp_path_factory.mktemp("searched"), SPEC).folder
+# Certificates
 
 
-@pytest.fixture(scope="module")
-def spec(searched, tmp_path_factory):
-    """A specification with the points of that library."""
-    folder = tmp_path_factory.mktemp("spec")
-    spec_of(folder, f'points = "{searched}"\n' + SPEC)
-    return folder / "spec.toml"
+def test_a_certificate_proves_the_entries_of_its_norm_under_the_gauge_strokes(built):
+    for token, norm in (("exact", 2), ("milp", 1)):
+        entry = document(built, f"{STEM}_{token}")
+        assert (entry["status"], entry["solved"]["by"]) == ("optimal", "certificate")
+        certificate = cf.read_certificate(built / CERTIFICATES[token], on=instance_of(built))
+        assert (certificate.norm, certificate.status) == (norm, "optimal")
+        assert certificate.bound == pytest.approx(entry["best"]["objective"], rel=1e-6)
+        assert f"=opt= {STEM}_{token} " in (built / "library.solu").read_text()
+        assert document(built, f"{STEM}_box_{token}")["status"] == "best known"
+    (bound,) = document(built, f"{STEM}_milp")["bounds"]
+    assert bound["certificate"] == CERTIFICATES["milp"]
+    assert not [one for one in document(built, f"{STEM}_qp")["bounds"] if "certificate" in one]
+    command = [sys.executable, built / "check_certificate.py", built / CERTIFICATES["exact"]]
+    assert subprocess.run(command, check=False, capture_output=True).returncode == 0
 
 
-def on(processor, *arguments):
-    """Run a command as on another processor."""
-    environment = os.environ | {"OPENBLAS_NUM_THREADS": "1"} | processor
-    command = [sys.executable, "-W", "ignore", "-m", "crossfield", "library", *map(str, arguments)]
-    subprocess.run(command, env=environment, check=True, capture_output=True)
+def forge_bytes(lib):
+    path = lib / CERTIFICATES["exact"]
+    data, half = path.read_bytes(), path.stat().st_size // 2
+    path.write_bytes(data[:half] + bytes([data[half] ^ 1]) + data[half + 1 :])
 
 
-@pytest.mark.slow
-def test_a_library_with_points_is_the_same_on_every_processor_and_verifies_there(spec, tmp_path):
-    first, *others = (tmp_path / str(number) for number in range(len(PROCESSORS)))
-    for processor, folder in zip(PROCESSORS, (first, *others), strict=True):
-        on(processor, "build", spec, "-o", folder, "--quiet")
-    for folder in others:
-        assert content(folder) == content(first)
-    on(PROCESSORS[-1], "verify", first)
+def forge_proof(lib):
+    """A certificate of a worse field."""
+    proof = cf.prove(instance_of(lib), jobs=1)
+    worse = replace(proof.field, beta=0.9 * proof.field.beta)
+    weak = replace(proof.with_levels(1, "gap"), field=worse, energy=worse.energy().total)
+    assert cf.write_certificate(weak, lib / CERTIFICATES["exact"], force=True).status == "gap"
 
 
-@pytest.mark.slow
-@pytest.mark.skipif(len(PROCESSORS) < 2, reason="this processor runs only one kind of OpenBLAS kernels")
-def test_a_library_without_points_is_the_same_under_other_kernels(tmp_path):
-    spec_of(tmp_path, SEARCHED)
-    spec = tmp_path / "spec.toml"
-    libraries = []
-    for number, processor in enumerate((PROCESSORS[0], PROCESSORS[-1])):
-        folder = tmp_path / str(number)
-        on(processor, "build", spec, "-o", folder, "--quiet")
-        libraries.append(content(folder))
-    first, other = libraries
-    assert other.keys() == first.keys()
-    assert [name for name in first if other[name] != first[name]] == []
+def in_about(**changes):
+    return lambda lib: change(lib / f"{STEM}.about.json", **changes)
 
 
-@pytest.mark.slow
-def test_given_points_are_stated_and_the_models_are_those_of_a_search(searched, spec, tmp_path):
-    library = build(read_spec(spec), tmp_path / "lib").folder
-    assert verify_library(library) == []
-    before, after = content(searched), content(library)
-    assert before.keys() == after.keys()
-    stated = {name for name in before if before[name] != after[name]}
-    assert all(name.endswith(".json") or name == "SHA256SUMS" for name in stated)
-    about = read_about(library / f"{STEM}.about.json")
-    old = read_about(searched / f"{STEM}.about.json")
-    assert all(about[key] == old[key] for key in ("fields", "certificates"))
-    assert "given" in about
-    assert "given" not in old
+DAMAGED = {
+    "bytes of a certificate": (forge_bytes, CERTIFICATES["exact"]),
+    "a worse field": (forge_proof, GAP),
+    "of another instance": (
+        lambda lib: shutil.copy(lib / f"{OTHER}.certificate.npz", lib / CERTIFICATES["exact"]),
+        "is a certificate of another instance",
+    ),
+    "a higher bound": (in_about(certificates__2__bound=99.0), GAP),
+    "another status": (in_about(certificates__2__status="gap"), GAP),
+    "another energy": (in_about(certificates__2__energy=99.0), GAP),
+    "an absent certificate": (in_about(certificates__2__file=f"{STEM}.b.npz"), "cannot be read"),
+    "half a surrogate": (in_about(title="half \ud800"), "half of a surrogate pair"),
+    "an infinite number": (in_about(fields__least_2__seconds=float("inf")), "a number that is not finite"),
+    "another version": (in_about(version=True), "has version True"),
+    "no field": (lambda lib: (lib / f"{STEM}.field.json").unlink(), f"{STEM}.field.json: cannot be read"),
+    "a damaged field": (lambda lib: (lib / f"{STEM}.field.json").write_text("{}"), f"{STEM}.field.json"),
+}
+"""Changes of given points, and words of the error."""
 
 
-@pytest.mark.slow
-def test_a_build_with_points_searches_for_nothing(searched, tmp_path):
-    """A greedy field that is given as the best one stays, and no optimum is proven."""
-    known = shutil.copytree(searched, tmp_path / "known")
-    poor = worsened(known / f"{SADDLE}.about.json")
-    about = read_about(known / f"{STEM}.about.json")
-    del about["certificates"]
-    (known / f"{STEM}.about.json").write_text(json.dumps(about))
-    library = library_of(tmp_path, 'points = "known"\n' + SPEC).folder
-    fields = read_about(library / f"{SADDLE}.about.json")["fields"]
-    assert {field["energy_2norm"] for field in fields.values()} == {poor}
-    assert read_library(library).entry(f"{STEM}_exact")["bounds"] == []
+@pytest.mark.parametrize("fault", DAMAGED)
+def test_damaged_or_forged_points_are_refused(fault, lib, tmp_path, capsys):
+    damage, words = DAMAGED[fault]
+    damage(tmp_path / "known")
+    spec = write_spec(tmp_path, ONE)
+    assert invoke(["library", "build", str(spec), "-o", str(tmp_path / "out")]) == 1
+    (line,) = complaints(capsys.readouterr().err).splitlines()
+    assert words in line
+    assert STEM in line
 
 
-@pytest.mark.slow
-def test_a_better_point_keeps_given_points_and_another_build_gives_the_same(searched, tmp_path):
-    """A library of poor points accepts a better one, which a new build from the ledger reproduces."""
-    known = shutil.copytree(searched, tmp_path / "known")
-    worsened(known / f"{SADDLE}.about.json")
-    spec = spec_of(tmp_path, 'points = "known"\n' + SPEC)
-    library = build(spec, tmp_path / "lib").folder
-    (tmp_path / "sent").mkdir()
-    shutil.copy(searched / f"{SADDLE}_exact.sol", tmp_path / "sent")
-    improved, _ = improve(library, tmp_path / "sent")
-    assert f"{SADDLE}_exact" in improved[f"{SADDLE}_exact.sol"]
-    assert verify_library(library) == []
-    again = spec_of(tmp_path, 'points = "known"\nledger = "lib/ledger.json"\n' + SPEC)
-    assert content(build(again, tmp_path / "other").folder) == content(library)
+def test_a_large_certificate_of_an_optimum_is_kept(tmp_path, monkeypatch):
+    """It was left out with its field, although it proved the optimum."""
+    monkeypatch.setattr(fields, "_MOST_BYTES", 1)  # which any certificate exceeds
+    lib = library_of(tmp_path, SPEC.replace("7-8", "7-7"))
+    assert lib.entry(f"{STEM}_exact")["status"] == "optimal"
+    assert (lib.folder / CERTIFICATES["exact"]).exists()
 
 
-@pytest.mark.slow
-def test_points_of_another_instance_are_reported_and_do_not_count(searched, tmp_path):
-    text = 'points = "known"\n' + SPEC.replace("seeds = [1]", "seeds = [2]")
-    known = shutil.copytree(searched, tmp_path / "known")
-    other = "cf_rand_n003_s2"
-    for path in [*known.glob(f"{STEM}.*"), *known.glob(f"{STEM}_box.*")]:
-        renamed = path.read_bytes()
-        if path.name.endswith(".about.json"):
-            renamed = renamed.replace(STEM.encode(), other.encode())
-        path.with_name(path.name.replace(STEM, other)).write_bytes(renamed)
-    lines = []
-    library = build(spec_of(tmp_path, text), tmp_path / "lib", progress=lines.append).folder
-    assert [line for line in lines if "another instance" in line] == [
-        f"{name}: the points given are of another instance; searched for others"
-        for name in (f"{other}_box", other)
-    ]
-    assert verify_library(library) == []
+def test_less_work_gives_the_same_instances_and_points_of_no_lower_energy(built, tmp_path):
+    less = library_of(tmp_path, SPEC.replace('"proven"', '"greedy"'))
+    names = [f"{STEM}_exact", f"{OTHER}_exact"]
+    for greedy, proven in zip(map(less.entry, names), [document(built, name) for name in names], strict=True):
+        assert (greedy["status"], greedy["best"]["solver"]) == ("best known", "crossfield (greedy)")
+        assert greedy["instance"]["sha256"] == proven["instance"]["sha256"]
+        assert proven["best"]["objective"] <= greedy["best"]["objective"] + 1e-12
 
 
-@pytest.mark.slow
-def test_points_that_are_missing_or_damaged_are_reported(searched, tmp_path):
-    with pytest.raises(InputError, match="points: there is no points"):
-        spec_of(tmp_path, 'points = "points"\n' + SPEC)
-    known = shutil.copytree(searched, tmp_path / "points")
-    spec = spec_of(tmp_path, 'points = "points"\n' + SPEC)
-    (known / f"{STEM}.field.json").write_text("{}")
-    assert f"{STEM}.field.json" in " ".join(map(str, build(spec, tmp_path / "lib").failed.values()))
-    (known / f"{STEM}.field.json").unlink()
-    with pytest.raises(InputError, match=rf"{STEM}\.field\.json: cannot be read"):
-        build(spec, tmp_path / "lib")
+# Tightened entries: the plain entry in the windows that a certificate leaves
 
 
-# The library that ships
+def test_a_tightened_entry_has_the_optimum_of_its_plain_one_and_names_its_certificate(built):
+    for token, file in CERTIFICATES.items():
+        narrow, plain = document(built, f"{STEM}_{token}_tight"), document(built, f"{STEM}_{token}")
+        for key in ("status", "bound", "gap", "instance"):
+            assert narrow[key] == plain[key]
+        assert narrow["best"]["objective"] == plain["best"]["objective"]
+        assert (narrow["tightened"]["certificate"], narrow["tightened"]["plain"]) == (file, plain["name"])
+        assert plain["name"] in [relation["entry"] for relation in narrow["equivalent"]]
+        assert "tightened" not in plain
+        windows = [problem(built, entry["name"]).blocks["alpha"] for entry in (narrow, plain)]
+        width = [(block.upper - block.lower).sum() for block in windows]
+        assert width[0] < width[1]
+    assert not list(built.glob("*_box_*tight*"))
 
 
-@pytest.mark.slow
-def test_the_points_that_ship_are_about_the_shipped_instances():
-    """No search is needed, and tiny and small instances with a proof have their certificates."""
-    spec = default_spec()
-    sizes = {path: path.stat().st_size for path in spec.points.iterdir()}
-    assert max(size for path, size in sizes.items() if path.suffix == ".npz") <= 2_000_000
-    assert sum(sizes.values()) < 32_000_000
-    points = read_points(spec.points)
-    for planned in plan_library(spec):
-        known = points(planned.recipe.name)
-        assert known.instance == make_instance(planned.recipe).sha256
-        for role in ROLES:
-            field, facts = known.field(role).field, known.about["fields"][role]
-            assert field.instance.sha256 == known.instance
-            for norm in NORMS:
-                assert field.energy(norm).total == facts[f"energy_{norm}norm"]
-        certificates = known.certificates(make_instance(planned.recipe), NORMS)
-        assert all(certificate.facts["status"] == "optimal" for certificate in certificates)
-        if planned.recipe.rung in {"tiny", "small"}:
-            assert tuple(certificate.norm for certificate in certificates) == planned.recipe.prove
-
-
-# Grades
-
-
-def run(**more):
-    facts = {"status": "optimal", "bound": 1.0, "threads": 1, "seconds": EASY} | more
-    return Record("cf_a_n004_milp", "0" * 64, "HiGHS", "1", **facts)
+@pytest.mark.parametrize("token", CERTIFICATES)
+def test_a_tightened_entry_has_the_bytes_of_an_export_with_the_certificate(built, tmp_path, token):
+    instance, certificate = built / f"{STEM}.instance.json", built / CERTIFICATES[token]
+    command = ["export", str(instance), "-o", str(tmp_path), "--tightened", str(certificate)]
+    assert invoke([*command, "-f", token, "-F", "mps"]) == 0
+    (written,) = tmp_path.glob("*.mps")
+    assert written.read_bytes() == (built / f"{STEM}_{token}_tight.mps").read_bytes()
 
 
 @pytest.mark.parametrize(
-    "status, runs, tangent, grade",
-    [
-        ("best known", [run(status="limit")], False, "open"),
-        ("optimal", [run()], False, "easy"),
-        ("claimed", [run()], False, "easy"),
-        ("optimal", [], True, "easy"),
-        ("optimal", [], False, "hard"),
-        ("optimal", [run(seconds=EASY + 1), run(threads=4), run(seconds=None)], False, "hard"),
-        ("optimal", [run(status="limit", seconds=1.0)], False, "hard"),
-        ("claimed", [run(bound=0.6)], False, "hard"),
-        ("claimed", [run(bound=1.0 - 2e-6), run(bound=None)], False, "hard"),
-        ("claimed", [run(bound=1.0 - 5e-7)], False, "easy"),
-    ],
+    "token, solver",
+    [("milp", "highs"), pytest.param("exact", "scip", marks=[pytest.mark.needs("scip"), pytest.mark.slow])],
 )
-def test_grades_follow_the_runs_on_an_entry(status, runs, tangent, grade):
-    """The best point has the objective 1; a claim of an optimum counts with a bound that proves it."""
-    assert difficulty(status, 1.0, runs, tangent=tangent) == grade
+def test_a_solver_finds_the_proven_optimum_of_a_tightened_entry(built, token, solver):
+    name = f"{STEM}_{token}_tight"
+    solution = cf.solve(problem(built, name), solver)
+    assert solution.objective == pytest.approx(document(built, name)["best"]["objective"], abs=1e-6)
+
+
+def test_a_tightened_entry_awaits_its_certificate(tmp_path, capfd):
+    """It is counted and listed with the reason, is no fault, and is made once its proof is sent."""
+    spec = write_spec(tmp_path, SPEC.replace('"proven"', '"greedy"').replace("7-8", "7-7"))
+    command = ["library", "build", str(spec), "-o", str(tmp_path / "lib")]
+    assert invoke(command) == 0
+    shown, lib = capfd.readouterr(), tmp_path / "lib"
+    assert shown.out.endswith(" entries; 2 tightened entries await a certificate\n")
+    assert complaints(shown.err) == ""
+    skipped = document(lib, "library")["skipped"]
+    assert skipped[f"{STEM}_exact_tight"] == (
+        f"{STEM} has no certificate in the 2-norm; give one of `crossfield prove` with --points"
+    )
+    assert f"{STEM}_milp_tight: {STEM} has no certificate in the 1-norm" in (lib / "README.md").read_text()
+    assert not list(lib.glob("*_tight*"))
+    (tmp_path / "sent").mkdir()
+    cf.write_certificate(cf.prove(instance_of(lib), jobs=1), tmp_path / "sent" / "it.npz")
+    assert invoke([*command, "--points", str(tmp_path / "sent")]) == 0
+    assert "; 1 tightened entries await a certificate; 1 of 1 points" in capfd.readouterr().out
+    assert document(lib, f"{STEM}_exact_tight")["status"] == "optimal"
+    assert defects(lib) == {}
+
+
+def test_a_field_outside_the_windows_is_not_better_and_not_refused(lib, tmp_path):
+    (tmp_path / "sent").mkdir()
+    cf.write_field(cf.power_field(instance_of(lib)), tmp_path / "sent" / "worse.npz")
+    assert improve(lib, tmp_path / "sent") == ({"worse.npz": []}, {})
+
+
+# Given points
+
+
+@pytest.mark.slow
+def test_given_points_are_stated_and_the_models_are_those_of_a_search(built, lib, tmp_path):
+    given = library_of(tmp_path, GIVEN, "given").folder
+    assert defects(given) == {}
+    before, after = content(built), content(given)
+    assert before.keys() == after.keys()
+    stated = {name for name in before if before[name] != after[name]}
+    assert all(name.endswith(".json") or name == "SHA256SUMS" for name in stated)
+    about, old = (document(one, f"{STEM}.about") for one in (given, built))
+    assert all(about[key] == old[key] for key in ("fields", "certificates"))
+    assert ("given" in about, "given" in old) == (True, False)
+
+
+@pytest.mark.slow
+def test_a_build_with_poor_points_searches_for_nothing_and_keeps_a_better_point(built, lib, tmp_path):
+    """Another build, from the same points and the ledger, gives the same library."""
+    poor = make_poor(tmp_path / "known")
+    poorly = library_of(tmp_path, GIVEN, "poorly").folder
+    about = document(poorly, f"{STEM}.about")
+    assert {field["energy_2norm"] for field in about["fields"].values()} == {poor}
+    assert document(poorly, f"{STEM}_exact")["bounds"] == []
+    (tmp_path / "sent").mkdir()
+    shutil.copy(built / f"{STEM}_exact.sol", tmp_path / "sent")
+    improved, _ = improve(poorly, tmp_path / "sent")
+    assert f"{STEM}_exact" in improved[f"{STEM}_exact.sol"]
+    assert defects(poorly) == {}
+    again = library_of(tmp_path, 'ledger = "poorly/ledger.json"\n' + GIVEN, "again").folder
+    assert content(again) == content(poorly)
+
+
+@pytest.mark.slow
+def test_points_of_another_instance_are_reported_and_do_not_count(lib, tmp_path, capsys):
+    known = tmp_path / "known"
+    for path in known.glob(f"{STEM}*"):
+        path.unlink()
+    for path in [*known.glob(f"{OTHER}.*"), *known.glob(f"{OTHER}_box.*")]:
+        data = path.read_bytes()
+        data = data.replace(OTHER.encode(), STEM.encode()) if path.suffix == ".json" else data
+        path.with_name(path.name.replace(OTHER, STEM)).write_bytes(data)
+        path.unlink()
+    spec = write_spec(tmp_path, GIVEN.replace("7-8", "7-7"))
+    assert invoke(["library", "build", str(spec), "-o", str(tmp_path / "out")]) == 0
+    assert complaints(capsys.readouterr().err).splitlines() == [
+        f"crossfield: {name}: the points given are of another instance; searched for others"
+        for name in (f"{STEM}_box", STEM)
+    ]
+    assert defects(tmp_path / "out") == {}

@@ -1,30 +1,21 @@
 """Points, fields and certificates of others in a build: better ones are kept, bad ones cost nothing."""
 
+import json
 import re
 import shutil
-from dataclasses import replace
 
 import crossfield as cf
 import highspy
 import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
-from crossfield.export.library.building.build import rebuild
-from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.documents import check_point
-from crossfield.export.library.documents.documents import problem_of, read_library, read_sidecar
-from crossfield.export.library.ledger.ledger import (
-    Record,
-    add_record,
-    merge_ledgers,
-    read_ledger,
-    write_ledger,
-)
-from crossfield.export.library.ledger.points import complete_point
-from crossfield.models.errors import InputError
-from crossfield.models.formulations.names import column_names, decode_names
-from libraries import OPEN, content, improve, library_of
-from places import DATA, SOLUTIONS
+from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
+from forging import change
+from instance_kinds import kind
+from libraries import OPEN, build, content, defects, document, improve, library_of, problem, read_spec
+from loops import for_each
+from places import SOLUTIONS
 
 STEM, OTHER = "cf_rand_n004_s6", "cf_rand_n004_s7"
 MILP, BILINEAR, QP, EXACT, CUBIC = (f"{STEM}_{short}" for short in ("milp", "bilin1", "qp", "exact", "cubic"))
@@ -58,33 +49,28 @@ def sent(tmp_path):
     return tmp_path / "sent"
 
 
-def entry_of(lib, name=MILP):
-    return read_sidecar(lib / f"{name}.json")
+def best(lib, name=MILP):
+    """The objective of the best point of an entry."""
+    return document(lib, name)["best"]["objective"]
 
 
-# what is better
+# What is better
 
 
 def test_the_command_keeps_what_is_better_and_reports_what_it_refuses(
-    opened, proof, answer, sent, tmp_path, capsys
+    opened, lib, proof, answer, sent, tmp_path, capsys
 ):
-    """Good, worse, forged and foreign files in one folder, beside files of other kinds."""
-    shutil.copytree(opened.parent / "points", tmp_path / "points")
+    """Good, worse, forged and foreign files in one folder, and files of other kinds, as those of a proof."""
     shutil.copy(opened.parent / "spec.toml", tmp_path)
-    command = ["library", "build", str(tmp_path / "spec.toml"), "-o", str(tmp_path / "lib")]
-    assert invoke(command) == 0
-    before = content(tmp_path / "lib")
-    assert before == content(opened)
-
+    command = ["library", "build", str(tmp_path / "spec.toml"), "-o", str(lib)]
     (sent / "deeper").mkdir()
     shutil.copy(answer, sent / "deeper")
-    cf.write_certificate(proof, sent / "proof.npz")
+    certificate = sent / "deeper" / "it.certificate.npz"
+    cf.write_certificate(proof, certificate)
+    data, half = certificate.read_bytes(), certificate.stat().st_size // 2
+    (sent / "q_forged.npz").write_bytes(data[:half] + bytes([data[half] ^ 1]) + data[half + 1 :])
     cf.write_field(cf.greedy_field(proof.field.instance), sent / "worse.npz")
-    data = (sent / "proof.npz").read_bytes()
-    half = len(data) // 2
-    (sent / "forged.npz").write_bytes(data[:half] + bytes([data[half] ^ 1]) + data[half + 1 :])
-    foreign = replace(proof.field.instance, name="another")
-    cf.write_certificate(cf.prove(foreign, jobs=1), sent / "foreign.npz")
+    cf.write_certificate(cf.prove(kind("full"), jobs=1), sent / "foreign.npz")
     cf.write_field(cf.greedy_field(cf.sample("mouse", 4)), sent / "foreign.json")
     (sent / f"{BILINEAR}.sol").write_text(re.sub("alpha_00_00 .*", "alpha_00_00 nan", answer.read_text()))
     (sent / "notes.txt").write_text("hello")
@@ -97,19 +83,15 @@ def test_the_command_keeps_what_is_better_and_reports_what_it_refuses(
     shown = capsys.readouterr()
     assert "; 2 of 7 points and certificates improve it\n" in shown.out
     refused = {line.split(": ")[1].rpartition("/")[2] for line in complaints(shown.err).splitlines()}
-    assert refused == {"forged.npz", "foreign.npz", "foreign.json", f"{BILINEAR}.sol"}
-    lib = tmp_path / "lib"
+    assert refused == {"q_forged.npz", "foreign.npz", "foreign.json", f"{BILINEAR}.sol"}
     for name in (EXACT, CUBIC):
-        entry = entry_of(lib, name)
-        assert (entry["status"], entry["difficulty"], entry["solved"]["by"]) == (
-            "optimal",
-            "hard",
-            "certificate",
-        )
+        entry = document(lib, name)
+        facts = (entry["status"], entry["difficulty"], entry["solved"]["by"])
+        assert facts == ("optimal", "hard", "certificate")
         assert (lib / entry["bounds"][0]["certificate"]).read_bytes() == data
-    assert entry_of(lib)["status"] == "best known"
-    assert entry_of(lib)["best"]["objective"] < entry_of(opened)["best"]["objective"]
-    assert verify_library(lib) == []
+    assert document(lib, MILP)["status"] == "best known"
+    assert best(lib) < best(opened)
+    assert defects(lib) == {}
 
     after = content(lib)
     assert invoke([*command, "--points", str(sent)]) == 1
@@ -119,43 +101,30 @@ def test_the_command_keeps_what_is_better_and_reports_what_it_refuses(
     assert content(lib) == after
 
 
-def test_the_folder_of_a_proof_is_taken_as_it_is(lib, sent, capsys):
-    """Its other files are passed over."""
-    instance = str(lib / f"{STEM}.instance.json")
-    assert invoke(["prove", instance, "-o", str(sent), "--quiet"]) == 0
-    improved, refused = improve(lib, sent)
-    assert refused == {}
-    assert {name for names in improved.values() for name in names} >= {EXACT, CUBIC}
-    assert entry_of(lib, EXACT)["status"] == "optimal"
-    assert verify_library(lib) == []
-
-
-@pytest.mark.parametrize("suffix", ["npz", "json"])
-def test_a_better_field_counts_for_every_entry_of_its_instance(lib, proof, sent, suffix):
-    cf.write_field(proof.field, sent / f"it.{suffix}")
+def test_a_better_field_counts_for_every_entry_of_its_instance(lib, proof, sent):
+    cf.write_field(proof.field, sent / "it.json")
     improved, _ = improve(lib, sent)
-    assert {EXACT, CUBIC} <= set(improved[f"it.{suffix}"])
-    for name in improved[f"it.{suffix}"]:
-        problem = problem_of(lib, entry_of(lib, name))
-        best = entry_of(lib, name)["best"]["objective"]
-        assert best == pytest.approx(problem.objective_value(complete_point(problem, proof.field)))
-    assert verify_library(lib) == []
-    assert improve(lib, sent) == ({f"it.{suffix}": []}, {})
+    assert {EXACT, CUBIC} <= set(improved["it.json"])
+    for name in improved["it.json"]:
+        entry = problem(lib, name)
+        assert best(lib, name) == pytest.approx(entry.objective_value(entry.point(proof.field)))
+    assert improve(lib, sent) == ({"it.json": []}, {})
 
 
-def test_a_better_point_counts_for_the_entries_of_its_norm(lib, answer):
-    before = entry_of(lib)["best"]["objective"]
+def test_a_better_point_counts_for_the_entries_of_its_norm_and_in_another_build(lib, answer, tmp_path):
+    before = best(lib)
     improved, _ = improve(lib, answer.parent)
     assert {MILP, BILINEAR} <= set(improved[answer.name])
     stated = float(re.search(r"^Objective (\S+)", answer.read_text(), re.MULTILINE)[1])
-    for name in (MILP, BILINEAR):
-        assert entry_of(lib, name)["best"]["objective"] == pytest.approx(stated, abs=1e-7)
     assert stated < before
+    for name in (MILP, BILINEAR):
+        assert best(lib, name) == pytest.approx(stated, abs=1e-7)
     checked = check_point.check(str(lib / f"{MILP}.mps"), str(lib / f"{MILP}.sol"))
     assert float(checked.objective) == pytest.approx(stated, abs=1e-7)
-    assert entry_of(lib, QP)["solved"]["by"] == "tangent"
-    assert f"=best= {MILP} {entry_of(lib)['best']['objective']!r}" in (lib / "library.solu").read_text()
-    assert verify_library(lib) == []
+    assert document(lib, QP)["solved"]["by"] == "tangent"
+    assert f"=best= {MILP} {best(lib)!r}" in (lib / "library.solu").read_text()
+    again = library_of(tmp_path, 'points = "lib"\nledger = "lib/ledger.json"\n' + OPEN, "again").folder
+    assert document(again, MILP)["best"] == document(lib, MILP)["best"]
 
 
 @pytest.mark.parametrize("norm, proven", [(1, {"milp", "bilin1"}), ("mixed", {"miqp"})])
@@ -164,61 +133,52 @@ def test_a_certificate_counts_for_the_entries_of_its_norm_alone(lib, proof, sent
     improved, _ = improve(lib, sent)
     assert set(improved["it.npz"]) == {f"{STEM}_{name}" for name in proven}
     for name in proven:
-        assert entry_of(lib, f"{STEM}_{name}")["status"] == "optimal"
-    assert entry_of(lib, EXACT)["status"] == "best known"
-    assert verify_library(lib) == []
+        assert document(lib, f"{STEM}_{name}")["status"] == "optimal"
+    assert document(lib, EXACT)["status"] == "best known"
 
 
-def test_points_of_the_ledger_are_taken_over_by_another_build(lib, answer, tmp_path):
-    improve(lib, answer.parent)
-    again = library_of(tmp_path, 'points = "lib"\nledger = "lib/ledger.json"\n' + OPEN, "again").folder
-    assert entry_of(again)["best"] == entry_of(lib)["best"]
-    assert verify_library(again) == []
+def test_a_worse_field_does_not_replace_a_better_one_that_came_meanwhile(lib):
+    field, sha256 = cf.read_field(lib / f"{STEM}.field.json"), document(lib, MILP)["problem_sha256"]
+    for solver, primal in (("first", 2.0), ("second", 1.0), ("third", 3.0)):
+        add_record(lib, Record(MILP, sha256, solver, "1", "feasible", primal=primal), field)
+    assert [record.solver for record in read_ledger(lib).records if record.point] == ["second"]
 
 
-# what is refused
+# What is refused
 
 
-def point_of(lib):
-    """The problem of an entry and its best known point."""
-    sidecar = entry_of(lib)
-    problem = problem_of(lib, sidecar)
-    return problem, cf.read_solution(lib / sidecar["best"]["point"], problem).point.copy()
-
-
-def write_point(problem, point, path):
-    """Write the point as a list of names and values."""
-    pairs = zip(decode_names(column_names(problem.instance, problem.blocks)), point.tolist(), strict=True)
+def write_point(lib, path, changes):
+    """Write the best point of an entry, changed in some blocks, as a list of names and values."""
+    entry = problem(lib, MILP)
+    point = cf.read_solution(lib / document(lib, MILP)["best"]["point"], entry).point.copy()
+    for block, change_it in changes.items():
+        part = entry.blocks[block].slice
+        point[part] = change_it(point[part])
+    pairs = zip(entry.to_arrays().column_names.tolist(), point.tolist(), strict=True)
     path.write_text("=obj= 0\n" + "".join(f"{name} {value!r}\n" for name, value in pairs))
+    return entry.violation(point).worst
 
 
 def test_auxiliary_variables_are_computed_again(lib, sent):
     """A point whose residual in an auxiliary row is 1e-6 is as good as its angles and jumps."""
-    problem, point = point_of(lib)
-    for name in ("s", "t", "gamma", "psi"):
-        point[problem.blocks[name].slice] -= 1e-6
-    assert problem.violation(point).worst > 1e-7
-    write_point(problem, point, sent / f"{MILP}.sol")
+    less = dict.fromkeys(("s", "t", "gamma", "psi"), lambda values: values - 1e-6)
+    assert write_point(lib, sent / f"{MILP}.sol", less) > 1e-7
     assert improve(lib, sent) == ({f"{MILP}.sol": []}, {})
 
 
-@pytest.mark.parametrize(
-    "block, value", [("alpha", 9.5), ("beta", 0.7855), ("p1", 2.0), ("p2", 9.0), ("p1", 0.4)]
-)
-def test_angles_and_jumps_are_not_mended(block, value, lib, sent):
-    problem, point = point_of(lib)
-    point[problem.blocks[block].slice] = value
-    write_point(problem, point, sent / f"{MILP}_mine.sol")
+def test_angles_and_jumps_are_not_mended(lib, sent):
+    for block, value in (("alpha", 9.5), ("beta", 0.7855), ("p1", 2.0), ("p2", 9.0), ("p1", 0.4)):
+        write_point(lib, sent / f"{MILP}_{block}_{value}.sol", {block: lambda _, value=value: value})
     before = content(lib)
     improved, refused = improve(lib, sent)
-    assert improved == {}
-    assert re.search(rf"violates {MILP} by .*, and 1e-08 is allowed", refused[f"{MILP}_mine.sol"])
+    assert (improved, len(refused)) == ({}, 5)
+    for reason in refused.values():
+        assert re.search(rf"violates {MILP} by .*, and 1e-08 is allowed", reason)
     assert content(lib) == before
 
 
 def test_a_refusal_names_the_file_and_the_reason_and_changes_nothing(lib, answer, sent):
-    text = answer.read_text()
-    unnamed = re.sub(r"sha256_\w+|(?<=ONE)_\w+", "", text)
+    unnamed = re.sub(r"sha256_\w+|(?<=ONE)_\w+", "", answer.read_text())
     (sent / "unnamed.sol").write_text(unnamed)
     (sent / f"{OTHER}_milp.sol").write_text(unnamed.replace("alpha_00_00", "alpha_09_09"))
     shutil.copy(SOLUTIONS / "highs-1.15.1_infeasible_style0.sol", sent / f"{MILP}-none.sol")
@@ -234,74 +194,47 @@ def test_a_refusal_names_the_file_and_the_reason_and_changes_nothing(lib, answer
     assert content(lib) == before
 
 
-def test_every_layout_of_answers_is_recognised(lib, sent):
-    """Answers of another problem are refused by name, none is passed over."""
-    files = [path for path in SOLUTIONS.iterdir() if path.is_file() and path.suffix == ".sol"]
-    for path in files:
-        shutil.copy(path, sent)
-    for path in (DATA / "logs").glob("*.log"):
-        shutil.copy(path, sent)
-    improved, refused = improve(lib, sent)
-    assert improved == {}
-    assert {path.name for path in files} <= set(refused)
-
-
-def test_a_folder_that_is_none_is_refused_before_the_build(opened, tmp_path, capsys):
+@for_each("name, reason", [("gone", "there is no such folder"), ("a.tar.gz", "is a file; unpack it")])
+def test_what_is_no_folder_is_refused_before_the_build(name, reason, opened, tmp_path, capsys):
+    (tmp_path / "a.tar.gz").write_bytes(b"\x1f\x8b")
     command = ["library", "build", str(opened.parent / "spec.toml"), "-o", str(tmp_path / "lib")]
-    assert invoke([*command, "--points", str(tmp_path / "gone")]) == 1
-    assert "gone: there is no such folder" in capsys.readouterr().err
+    assert invoke([*command, "--points", str(tmp_path / name)]) == 1
+    assert f"{name}: {reason}" in complaints(capsys.readouterr().err)
     assert not (tmp_path / "lib").exists()
 
 
-# ledgers
+def test_a_ledger_with_a_damaged_or_missing_field_is_refused(lib, answer, tmp_path):
+    improve(lib, answer.parent)
+    field = max(record.point for record in read_ledger(lib).records if record.point)
+    for data in (b"{}", None):
+        (lib / field).write_bytes(data) if data else (lib / field).unlink()
+        with pytest.raises((cf.InputError, cf.InstanceError), match=re.escape(field)):
+            library_of(tmp_path, 'ledger = "lib/ledger.json"\n' + OPEN, "again")
+        assert list((tmp_path / "again").iterdir()) == []
+    change(lib / "ledger.json", records=[{}])
+    with pytest.raises(cf.InstanceError, match=r"ledger\.json: \$\.records\[0\]"):
+        library_of(tmp_path, 'ledger = "lib/ledger.json"\n' + OPEN, "again")
 
 
-def test_the_best_run_of_each_solver_is_shown(lib):
-    sidecar = entry_of(lib)
-    best, sha = sidecar["best"]["objective"], sidecar["problem_sha256"]
-    facts = {"status": "limit", "seconds": 3.0, "threads": 2, "time_limit": 60.0}
-    for solver, bound in (("SCIP", 0.7), ("SCIP", 0.6), ("Own", 0.1)):
-        add_record(lib, Record(MILP, sha, solver, "1", bound=bound * best, **facts))
-    rebuild(lib)
-    runs = entry_of(lib)["runs"]
-    assert [(run["solver"], run["bound"] / best) for run in runs] == [
-        ("Own", pytest.approx(0.1)),
-        ("SCIP", pytest.approx(0.7)),
+@pytest.mark.slow
+def test_a_build_that_is_forced_does_without_files_that_its_ledger_has_lost(opened, lib, answer, proof, sent):
+    """The entries are built again without them, and the same points can be sent again."""
+    shutil.copy(answer, sent)
+    cf.write_certificate(proof, sent / "proof.npz")
+    improve(lib, sent)
+    improved, ledger, spec = content(lib), read_ledger(lib), read_spec(opened.parent / "spec.toml")
+    lost = [name for name in ledger.files if name in improved]
+    assert len(lost) > 2
+    for name in lost:
+        (lib / name).unlink()
+    with pytest.raises(cf.InputError, match=r"cannot be read"):
+        build(spec, lib)
+    build(spec, lib, force=True)
+    assert len(read_ledger(lib).records) == len(ledger.records)
+    assert not read_ledger(lib).files
+    assert [best(lib, name) for name in (MILP, EXACT)] == [best(opened, name) for name in (MILP, EXACT)]
+    assert defects(lib) == {}
+    assert improve(lib, sent)[1] == {}
+    assert [best(lib, name) for name in (MILP, EXACT)] == [
+        json.loads(improved[f"{name}.json"])["best"]["objective"] for name in (MILP, EXACT)
     ]
-    assert runs[0]["limit"] == 60.0
-    assert len(read_ledger(lib).records) == 3
-    assert verify_library(lib) == []
-
-
-def test_a_worse_field_does_not_replace_a_better_one_that_came_meanwhile(lib):
-    document = read_library(lib).entries[0]
-    field = cf.read_field(lib / f"{document['name'].rpartition('_')[0]}.field.json")
-    facts = (document["name"], document["problem_sha256"])
-    for solver, primal in (("first", 2.0), ("second", 3.0), ("third", 1.0)):
-        add_record(lib, Record(*facts, solver, "1", "feasible", primal=primal), field)
-    assert {kept.solver: kept.point is not None for kept in read_ledger(lib).records} == {
-        "first": False,
-        "second": False,
-        "third": True,
-    }
-
-
-def test_a_ledger_is_merged_before_it_is_written(lib, tmp_path):
-    document = read_library(lib).entries[0]
-    field = cf.read_field(lib / f"{document['name'].rpartition('_')[0]}.field.json")
-    record = Record(document["name"], document["problem_sha256"], "S", "1", "feasible", primal=1.0)
-    kept = add_record(lib, record, field)
-    (tmp_path / "new").mkdir()
-    ledger = merge_ledgers(tmp_path / "new", read_ledger(lib), [record.entry], [])
-    assert list((tmp_path / "new").iterdir()) == []
-    assert ledger.read_field(kept).instance.sha256 == field.instance.sha256
-    write_ledger(ledger)
-    assert read_ledger(tmp_path / "new").records == (kept,)
-    assert (tmp_path / "new" / kept.point).read_bytes() == (lib / kept.point).read_bytes()
-
-
-def test_an_archive_is_refused_with_the_remedy(opened, tmp_path):
-    packed = shutil.make_archive(str(tmp_path / "a"), "gztar", opened.parent, opened.name)
-    for refused in (verify_library, lambda path: improve(opened, path)):
-        with pytest.raises(InputError, match=r"a\.tar\.gz: is a file; unpack it, as with `tar -xzf`"):
-            refused(packed)

@@ -1,46 +1,43 @@
-"""Runs of installed solvers on a library, and the status of entries that follows from runs."""
+"""Runs of installed solvers on a library, and the status and grade of entries that follow from runs."""
 
+import re
 import shutil
 from dataclasses import replace
 from itertools import combinations
 
+import crossfield as cf
 import pytest
 from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.cli.library_command import solve_command
-from crossfield.export.library.building.build import rebuild
-from crossfield.export.library.building.table import read_table
-from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.contributions.solve import solve_library
-from crossfield.export.library.documents.documents import read_library, read_sidecar
 from crossfield.export.library.ledger.grades import (
+    EASY,
     MAKERS,
-    cut_bound,
+    difficulty,
     entry_status,
     is_proven,
     is_refuted,
-    relative_gap,
 )
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.solvers_table import SOLVERS
-from crossfield.models.errors import CrossfieldError, OutputError
 from crossfield.models.written_files import LIST
-from libraries import OPEN, library_of
+from libraries import OPEN, content, defects, document, library_of, rebuild
 
-MILP, BILINEAR = "cf_rand_n004_s6_milp", "cf_rand_n004_s6_bilin1"
+MILP, BILINEAR, OTHER = "cf_rand_n004_s6_milp", "cf_rand_n004_s6_bilin1", "cf_rand_n004_s7_milp"
 SMALL = """formulations = ["bilin1", "milp", "qp"]
 [rungs.tiny]
 sizes = [3]
 formats = ["mps"]
-prove = false
 [[sketches]]
 name = "a"
 sample = "mouse"
+points = "greedy"
 """
 
 
 @pytest.fixture(scope="module")
-def small(short_searches, tmp_path_factory):
+def small(tmp_path_factory):
     """A library of one instance; not to be changed."""
     return library_of(tmp_path_factory.mktemp("small"), SMALL).folder
 
@@ -51,22 +48,18 @@ def copy(small, tmp_path):
 
 
 def record_of(lib, solver, name=MILP, **changes):
-    sidecar = read_sidecar(lib / f"{name}.json")
+    sidecar = document(lib, name)
     facts = {"status": "optimal", "bound": sidecar["best"]["objective"]} | changes
     return Record(name, sidecar["problem_sha256"], solver, "1", **facts)
 
 
-# bounds and status
+# Bounds, status and grades
 
 
 def test_a_bound_a_little_above_a_point_is_cut_and_one_far_above_is_refuted():
-    """A little above a feasible point a bound is cut to it; far above it is wrong."""
-    assert cut_bound(8.4e-9, 1.3e-28) == 1.3e-28
     assert not is_refuted(8.4e-9, 1.3e-28)
     assert is_refuted(1e-3, 1.3e-28)
-    assert cut_bound(0.4, 0.5) == 0.4
-    assert is_proven(1.3e-28, cut_bound(8.4e-9, 1.3e-28))
-    assert relative_gap(1.3e-28, 1.3e-28) == 0.0
+    assert is_proven(1.3e-28, 8.4e-9)
 
 
 def test_agreement_needs_three_makers_whatever_the_order():
@@ -82,94 +75,115 @@ def test_agreement_needs_three_makers_whatever_the_order():
     assert MAKERS["CPLEX in GAMS"] == MAKERS["CPLEX"]
 
 
+def run(**more):
+    facts = {"status": "optimal", "bound": 1.0, "threads": 1, "seconds": EASY} | more
+    return Record("cf_a_n004_milp", "0" * 64, "HiGHS", "1", **facts)
+
+
+@pytest.mark.parametrize(
+    "status, runs, tangent, grade",
+    [
+        ("best known", [run(status="limit")], False, "open"),
+        ("optimal", [run()], False, "easy"),
+        ("claimed", [run()], False, "easy"),
+        ("optimal", [], True, "easy"),
+        ("optimal", [], False, "hard"),
+        ("optimal", [run(seconds=EASY + 1), run(threads=4), run(seconds=None)], False, "hard"),
+        ("optimal", [run(status="limit", seconds=1.0)], False, "hard"),
+        ("claimed", [run(bound=0.6)], False, "hard"),
+        ("claimed", [run(bound=1.0 - 2e-6), run(bound=None)], False, "hard"),
+        ("claimed", [run(bound=1.0 - 5e-7)], False, "easy"),
+    ],
+)
+def test_grades_follow_the_runs_on_an_entry(status, runs, tangent, grade):
+    """The best point has the objective 1; a claim of an optimum counts with a bound that proves it."""
+    assert difficulty(status, 1.0, runs, tangent=tangent) == grade
+
+
 def test_programs_of_three_makers_agree_on_an_entry_and_those_like_it_and_prove_nothing(lib):
     for solver in ("A", "B", "C", "CBC", "Bonmin", "HiGHS"):
         add_record(lib, record_of(lib, solver))
     rebuild(lib)
-    sidecar = read_sidecar(lib / f"{MILP}.json")
-    assert (sidecar["status"], len(sidecar["claimed"])) == ("claimed", 6)
+    assert (document(lib, MILP)["status"], len(document(lib, MILP)["claimed"])) == ("claimed", 6)
     add_record(lib, record_of(lib, "Gurobi", BILINEAR))
     rebuild(lib)
-    sidecar = read_sidecar(lib / f"{MILP}.json")
+    sidecar = document(lib, MILP)
     assert (sidecar["status"], "solved" in sidecar) == ("agreed", False)
-    programs = {program["solver"]: program for program in sidecar["claimed"]}
-    assert set(programs) == {"A", "B", "C", "CBC", "Bonmin", "HiGHS", "Gurobi"}
-    assert programs["Gurobi"]["via"] == BILINEAR
+    programs = {program["solver"]: program.get("via") for program in sidecar["claimed"]}
+    assert programs == dict.fromkeys(("A", "B", "C", "CBC", "Bonmin", "HiGHS")) | {"Gurobi": BILINEAR}
     solu = (lib / "library.solu").read_text()
     assert f"=best= {BILINEAR} " in solu
     assert f"=bestdual= {BILINEAR} " in solu
-    (row,) = [row for row in read_table(lib / "entries.csv") if row["name"] == MILP]
-    assert (row["status"], row["optimum"], row["solved"]) == ("agreed", None, None)
-    assert verify_library(lib) == []
+    assert ",agreed," in re.search(rf"^{MILP},.*$", (lib / "entries.csv").read_text(), re.MULTILINE)[0]
+    assert defects(lib) == {}
 
 
-def test_a_bound_of_another_problem_is_never_taken(lib):
-    other = replace(record_of(lib, "Any"), problem_sha256="0" * 64)
-    for record in (other, record_of(lib, "Any", bound=0.001, status="limit")):
+def test_bounds_beyond_the_point_and_of_another_problem_do_not_count_and_others_do(lib):
+    """A bound a little above the point is cut; the best run of each solver is shown."""
+    best, other = (document(lib, name)["best"]["objective"] for name in (MILP, OTHER))
+    limit = {"status": "limit", "seconds": 3.0, "threads": 2, "time_limit": 60.0}
+    for record in (
+        record_of(lib, "Xpress", bound=best + 1e-2),
+        replace(record_of(lib, "Any"), problem_sha256="0" * 64),
+        record_of(lib, "HiGHS", bound=0.9 * best, **limit),
+        record_of(lib, "HiGHS", bound=0.8 * best, **limit),
+        record_of(lib, "S", OTHER, bound=other + 4e-7, status="limit"),
+    ):
         add_record(lib, record)
-    after = rebuild(lib).entry(MILP)
-    assert [bound["bound"] for bound in after["bounds"]] == [0.001]
-    assert after["status"] == "best known"
-    assert len(read_ledger(lib).records) == 2
+    with pytest.raises(cf.InputError, match="bound is inf; give a finite number"):
+        add_record(lib, record_of(lib, "S", bound=float("inf")))
+    rebuild(lib)
+    sidecar, cut = document(lib, MILP), document(lib, OTHER)
+    assert (sidecar["status"], sidecar["bound"]) == ("best known", 0.9 * best)
+    assert [bound["solver"] for bound in sidecar["bounds"]] == ["HiGHS"]
+    shown = [(one["solver"], one.get("bound"), one.get("limit")) for one in sidecar["runs"]]
+    assert shown == [("HiGHS", 0.9 * best, 60.0), ("Xpress", None, None)]
+    assert cut["bound"] == other == max(bound["bound"] for bound in cut["bounds"])
+    assert (cut["status"], cut["gap"]) == ("claimed", 0.0)
+    assert cut["claimed"] == [{"solver": "S", "version": "1"}]
+    assert solve_library(lib, solvers=["highs"], up_to="small") == []  # all entries are on the rung medium
+    assert len(read_ledger(lib).records) == 5
+    assert defects(lib) == {}
 
 
-def test_a_bound_a_little_above_the_point_is_cut(lib):
-    best = read_sidecar(lib / f"{MILP}.json")["best"]["objective"]
-    add_record(lib, record_of(lib, "S", bound=best + 4e-7, status="limit"))
-    again = rebuild(lib).entry(MILP)
-    assert again["bound"] == best == max(bound["bound"] for bound in again["bounds"])
-    assert (again["status"], again["gap"]) == ("claimed", 0.0)
-    assert again["claimed"] == [{"solver": "S", "version": "1"}]
-    assert verify_library(lib) == []
+# Solving
 
 
-def test_a_bound_far_above_the_point_does_not_count_and_others_do(lib):
-    """The library can still be built after a solver has exceeded its tolerances."""
-    best = read_sidecar(lib / f"{MILP}.json")["best"]["objective"]
-    add_record(lib, record_of(lib, "Xpress", bound=best + 1e-2))
-    add_record(lib, record_of(lib, "HiGHS", bound=0.9 * best))
-    again = rebuild(lib).entry(MILP)
-    assert (again["status"], again["bound"]) == ("best known", 0.9 * best)
-    assert [bound["solver"] for bound in again["bounds"]] == ["HiGHS"]
-    assert [run.get("bound") for run in again["runs"]] == [0.9 * best, None]
-    assert verify_library(lib) == []
-
-
-# solving
-
-
-@pytest.mark.slow
-def test_solving_proves_optima_and_equivalent_entries_share_their_bounds(copy):
-    assert "=opt= cf_a_n003_milp" not in (copy / "library.solu").read_text()
+def test_solving_claims_optima_and_equivalent_entries_share_their_bounds(copy):
+    """A release, without hidden files, is solved too, unless its ledger was changed."""
+    (copy / LIST).unlink()
+    assert "=best= cf_a_n003_milp" in (copy / "library.solu").read_text()
     records = solve_library(copy, solvers=["highs"], time_limit=250.0)
     assert [(record["entry"], record["status"]) for record in records] == [
         ("cf_a_n003_milp", "optimal"),
         ("cf_a_n003_qp", "optimal"),
     ]
-    library = read_library(copy)
-    milp, bilinear = library.entry("cf_a_n003_milp"), library.entry("cf_a_n003_bilin1")
+    milp, bilinear = document(copy, "cf_a_n003_milp"), document(copy, "cf_a_n003_bilin1")
     assert (milp["status"], bilinear["status"]) == ("claimed", "claimed")
     assert bilinear["claimed"] == [milp["claimed"][0] | {"via": "cf_a_n003_milp"}]
-    assert milp["bounds"][0]["via"] is None
-    assert bilinear["bounds"][0]["via"] == "cf_a_n003_milp"
+    assert (milp["bounds"][0]["via"], bilinear["bounds"][0]["via"]) == (None, "cf_a_n003_milp")
     solu = (copy / "library.solu").read_text().splitlines()
     tags = {"optimal": "=opt=", "claimed": "=best="}
-    optima = [
-        f"{tags[entry['status']]} {entry['name']} {entry['best']['objective']!r}" for entry in library.entries
-    ]
+    entries = [document(copy, name) for name in document(copy, "library")["entries"]]
+    optima = [f"{tags[one['status']]} {one['name']} {one['best']['objective']!r}" for one in entries]
     assert [line for line in solu if not line.startswith("=bestdual=")] == optima
+    assert defects(copy) == {}
     assert solve_library(copy, solvers=["highs"], time_limit=250.0) == []
+    ledger = copy / "ledger.json"
+    ledger.write_text(ledger.read_text().replace('"threads": 1', '"threads": 2'))
+    with pytest.raises(cf.OutputError, match=r"ledger\.json: is not crossfield's, or has changed"):
+        solve_library(copy, solvers=["highs"])
 
 
 @pytest.mark.slow
-def test_every_installed_program_solves_its_problems(opened, tmp_path):
+def test_every_installed_program_solves_its_problems(tmp_path):
     entries = OPEN.replace('"bilin1", "miqp", "exact", "cubic", ', "").replace("[6, 7]", "[6]")
-    lib = library_of(tmp_path, f'points = "{opened}"\n{entries}').folder
+    lib = library_of(tmp_path, entries).folder
     names = [
         name for name in ("gurobi", "cplex", "xpress", "scip", "cbc", "glpk") if not SOLVERS[name].missing
     ]
     records = solve_library(lib, solvers=[*names, "highs"], time_limit=60.0, machine="a machine")
-    best = read_sidecar(lib / f"{MILP}.json")["best"]["objective"]
+    best = document(lib, MILP)["best"]["objective"]
     mine = {facts["solver"]: facts for facts in records if facts["entry"] == MILP}
     assert set(mine) == {SOLVERS[name].title for name in [*names, "highs"]}
     for record in mine.values():
@@ -177,8 +191,8 @@ def test_every_installed_program_solves_its_problems(opened, tmp_path):
         assert record["bound"] is None or record["bound"] <= best + 1e-6
         assert record["machine"] == "a machine"
     if len({SOLVERS[name].maker for name in names}) > 3:
-        assert read_sidecar(lib / f"{MILP}.json")["status"] == "agreed"
-    assert verify_library(lib) == []
+        assert document(lib, MILP)["status"] == "agreed"
+    assert defects(lib) == {}
     assert solve_library(lib, solvers=names, time_limit=60.0) == []
 
 
@@ -187,24 +201,15 @@ def test_a_limit_that_leaves_no_time_to_start_a_solver_is_counted_and_the_others
     solve_command(copy, solver=["highs"], time_limit=1e-9)
     said = capfd.readouterr().out
     assert said == f"{copy / 'ledger.json'}: 2 new records, 2 from runs without a point\n"
-    records = read_ledger(copy).records
-    assert {record.entry for record in records} == {"cf_a_n003_milp", "cf_a_n003_qp"}
-    assert {(record.status, record.seconds) for record in records} == {("no point", None)}
+    runs = {(record.entry, record.status, record.seconds) for record in read_ledger(copy).records}
+    assert runs == {("cf_a_n003_milp", "no point", None), ("cf_a_n003_qp", "no point", None)}
 
 
-def test_a_release_without_hidden_files_is_solved_unless_its_ledger_was_changed(copy):
-    (copy / LIST).unlink()
-    records = solve_library(copy, solvers=["highs"], time_limit=250.0)
-    assert [record["status"] for record in records] == ["optimal", "optimal"]
-    assert verify_library(copy) == []
-    ledger = copy / "ledger.json"
-    ledger.write_text(ledger.read_text().replace('"threads": 1', '"threads": 2'))
-    with pytest.raises(OutputError, match=r"ledger\.json: is not crossfield's, or has changed"):
-        solve_library(copy, solvers=["highs"])
-
-
-def interrupting(lines):
-    """A progress that presses Ctrl-C at the first line that contains one of these texts, and forgets it."""
+@pytest.mark.parametrize(
+    "lines", [pytest.param(["2 of 2 runs"], marks=pytest.mark.slow), ["2 of 2 runs", "index"]]
+)
+def test_ctrl_c_keeps_the_runs_before_it_and_the_next_solve_completes_the_rest(copy, lines):
+    """A progress presses Ctrl-C at the first line that contains one of these texts, and forgets it."""
     left = list(lines)
 
     def progress(line):
@@ -212,55 +217,53 @@ def interrupting(lines):
             left.pop(0)
             raise KeyboardInterrupt
 
-    return progress
-
-
-def test_ctrl_c_keeps_the_runs_before_it_and_the_library_is_whole(copy):
     with pytest.raises(KeyboardInterrupt):
-        solve_library(copy, solvers=["highs"], time_limit=250.0, progress=interrupting(["2 of 2 runs"]))
+        solve_library(copy, solvers=["highs"], time_limit=250.0, progress=progress)
     (record,) = read_ledger(copy).records
-    milp = read_sidecar(copy / "cf_a_n003_milp.json")
-    assert (milp["status"], milp["best"]["objective"]) == ("claimed", pytest.approx(record.primal))
-    assert verify_library(copy) == []
+    findings = defects(copy)
+    assert ("ledger.json" in findings) == ("index" in lines)
+    assert not [what for what in findings.values() if "; remove it" in what]
+    if not findings:
+        milp = document(copy, "cf_a_n003_milp")
+        assert (milp["status"], milp["best"]["objective"]) == ("claimed", pytest.approx(record.primal))
+    records = solve_library(copy, solvers=["highs"], time_limit=250.0)
+    assert [record["entry"] for record in records] == ["cf_a_n003_qp"]
+    assert defects(copy) == {}
 
 
-def test_an_interrupted_rebuild_is_completed_by_the_next_solve(copy):
-    lines = interrupting(["2 of 2 runs", "index"])
-    with pytest.raises(KeyboardInterrupt):
-        solve_library(copy, solvers=["highs"], time_limit=250.0, progress=lines)
-    findings = verify_library(copy)
-    assert {"ledger.json"} <= {finding.file for finding in findings}
-    assert not [finding for finding in findings if finding.remedy.startswith("remove")]
-    assert [record["entry"] for record in solve_library(copy, solvers=["highs"], time_limit=250.0)] == [
-        "cf_a_n003_qp"
-    ]
-    assert verify_library(copy) == []
+ABSENT = "no_such_package"
+REFUSED = {
+    "no library": (["."], None, ".: is no library"),
+    "an unknown solver": (["copy", "--solver", "magic"], None, "there is no solver 'magic'"),
+    "two lines": (["copy", "--by", "A. Name\nand others"], None, "by: "),
+    "an unknown rung": (["copy", "--up-to", "huge"], None, "there is no rung 'huge'"),
+    "a package that is absent": (["copy", "--solver", "highs"], None, f"not installed; pip install {ABSENT}"),
+    "a program that is absent": (
+        ["copy", "--solver", "glpk"], None, "GLPK is not installed; apt install glpk-utils"
+    ),
+    "no JSON": (["copy"], "{", "ledger.json: is not valid JSON"),
+    "another kind": (["copy"], '{"format": "x"}', "is not a file of this kind"),
+    "an empty record": (
+        ["copy"], '{"format": "crossfield-ledger", "version": 1, "records": [{}]}', "$.records[0]"
+    ),
+    "no checksums": (["copy", "--solver", "highs"], "", "SHA256SUMS: cannot be read"),
+}  # fmt: skip
+"""Arguments, what the ledger holds, and the words of the error."""
 
 
-def test_a_solver_that_is_not_installed_is_one_line(copy, monkeypatch, hidden):
-    hidden("glpsol")
-    with pytest.raises(CrossfieldError, match=r"^GLPK is not installed; apt install glpk-utils$"):
-        solve_library(copy, solvers=["glpk"])
-    monkeypatch.setitem(SOLVERS, "highs", replace(SOLVERS["highs"], package="no_such_package"))
-    with pytest.raises(CrossfieldError, match=r"^HiGHS is not installed; pip install no_such_package$"):
-        solve_library(copy, solvers=["highs"])
-    assert read_ledger(copy).records == ()
-
-
-def test_unknown_names_damaged_ledgers_and_folders_without_a_library_are_one_line(copy, tmp_path, capfd):
-    for arguments, words in (
-        (["solve", tmp_path], "is no library"),
-        (["solve", copy, "--solver", "magic"], "there is no solver 'magic'"),
-        (["solve", copy, "--up-to", "huge"], "there is no rung 'huge'"),
-        (["build", tmp_path / "gone.toml", "-o", tmp_path / "x"], "gone.toml: cannot be read"),
-        ("{", "ledger.json: is not valid JSON"),
-        ('{"format": "x"}', "is not a file of this kind"),
-        ('{"format": "crossfield-ledger", "version": 1, "records": [{}]}', "$.records[0]"),
-    ):
-        if isinstance(arguments, str):
-            (copy / "ledger.json").write_text(arguments)
-        command = ["solve", copy, "--quiet"] if isinstance(arguments, str) else arguments
-        assert invoke(["library", *map(str, command)]) == 1
-        shown = complaints(capfd.readouterr().err)
-        assert len(shown.splitlines()) == 1
-        assert words in shown
+@pytest.mark.parametrize("fault", REFUSED)
+def test_a_solve_is_refused_before_any_run(fault, copy, tmp_path, monkeypatch, hidden, capfd):
+    arguments, ledger, words = REFUSED[fault]
+    monkeypatch.chdir(tmp_path)
+    if "absent" in fault:
+        hidden("glpsol")
+        monkeypatch.setitem(SOLVERS, "highs", replace(SOLVERS["highs"], package=ABSENT))
+    if ledger:
+        (copy / "ledger.json").write_text(ledger)
+    if fault == "no checksums":
+        (copy / "SHA256SUMS").unlink()
+    before = content(copy)
+    assert invoke(["library", "solve", *arguments]) == 1
+    (line,) = complaints(capfd.readouterr().err).splitlines()
+    assert words in line
+    assert content(copy) == before

@@ -2,11 +2,10 @@
 
 import json
 
+import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.pictures.mesh_view import MOST_TURNED, model_data
-from crossfield.models.field.field import CrossField
-from crossfield.models.instance.instance import Instance
 from crossfield.models.mesh.shapes import blocks, star
 from crossfield.templates import ENVIRONMENT
 
@@ -15,9 +14,9 @@ MOST_BYTES = 200_000
 
 def flat_angles(mesh):
     """The field whose angles are 0 in every frame."""
-    instance = Instance.on_faces("part", mesh, [], [], [])
+    instance = cf.Instance.on_faces("part", mesh, [], [], [])
     nothing = np.zeros(mesh.size)
-    return CrossField(instance, nothing, nothing, np.zeros(len(mesh.first), int)).with_best_jumps()
+    return cf.CrossField(instance, nothing, nothing, np.zeros(len(mesh.first), int)).with_best_jumps()
 
 
 def page_of(field):

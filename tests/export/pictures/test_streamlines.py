@@ -1,35 +1,30 @@
+"""Streamlines: along the field, evenly spaced, to the border, and no farther than a singularity."""
+
 from __future__ import annotations
 
+import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.pictures.streamlines import CLOSEST, align_labels, streamlines
-from crossfield.models.errors import InputError
-from crossfield.models.field.field import CrossField, field_in_windows
-from crossfield.models.instance.instance import Instance
+from loops import for_each
 from scipy.spatial import cKDTree
 
-pytestmark = pytest.mark.numeric
 
-
-def field_of(mask, line, skew, stroke=0):
+def field_of(mask, line, skew=lambda x, y: 0.0 * x, stroke=0):
     """The field with line u at angle line(x, y) and beta = skew(x, y); x, y from the middle of the grid,
     y up, in pixels.
     """
     mask = np.asarray(mask, dtype=bool)
     row, column = np.nonzero(mask)
     x, y = column - (mask.shape[1] - 1) / 2, (mask.shape[0] - 1) / 2 - row
-    angle, beta = line(x, y) + 0.0 * x, skew(x, y) + 0.0 * x
+    u, beta = line(x, y) + 0.0 * x, skew(x, y) + 0.0 * x
     pixel = np.array([[row[stroke], column[stroke]]])
-    instance = Instance.on_pixels("sample", mask, pixel, angle[[stroke]], np.array([1.0]))
-    return field_in_windows(instance, angle - beta, beta, np.zeros(len(instance.grid.first), dtype=np.int32))
+    instance = cf.Instance.on_pixels("sample", mask, pixel, u[[stroke]], np.array([1.0]))
+    return cf.CrossField.from_lines(instance, u, u + np.pi / 2 - 2 * beta)
 
 
 def square(size):
     return np.ones((size, size), dtype=bool)
-
-
-def zero(x, _y):
-    return 0.0 * x
 
 
 def waves(mask):
@@ -40,15 +35,15 @@ def waves(mask):
 
 def quarter(size, index, x0=0.0, y0=0.0):
     """One singularity of index +-1/4 at (x0, y0)."""
-    return field_of(square(size), lambda x, y: index * np.arctan2(y - y0, x - x0) + 0.2, zero)
+    return field_of(square(size), lambda x, y: index * np.arctan2(y - y0, x - x0) + 0.2)
 
 
-def random_labels(field, seed):
+def random_labels(field):
     """The same field with every pixel's label changed at random."""
     grid = field.instance.grid
-    k = np.random.default_rng(seed).integers(-3, 4, grid.size)
+    k = np.random.default_rng(2).integers(-3, 4, grid.size)
     p = field.p - k[grid.first] + k[grid.second]
-    return CrossField(field.instance, field.alpha + k * np.pi / 2, (-1.0) ** k * field.beta, p)
+    return cf.CrossField(field.instance, field.alpha + k * np.pi / 2, (-1.0) ** k * field.beta, p)
 
 
 def length_of(points):
@@ -59,17 +54,11 @@ def all_points(lines):
     return np.concatenate([line.points for line in lines])
 
 
-def pixels_under(field, points):
-    mask = field.instance.mask
-    row, column = np.rint(-points[:, 1]).astype(int), np.rint(points[:, 0]).astype(int)
-    assert row.min() >= 0
-    assert column.min() >= 0
-    assert row.max() < mask.shape[0]
-    assert column.max() < mask.shape[1]
-    return row, column
+def pixels_under(points):
+    return np.rint(-points[:, 1]).astype(int), np.rint(points[:, 0]).astype(int)
 
 
-@pytest.mark.parametrize("u, beta", [(0.0, 0.0), (0.4, 0.3), (2.2, -0.6), (1.5707, 0.7), (3.0, 0.1)])
+@for_each("u, beta", [(0.0, 0.0), (2.2, -0.6), (1.5707, 0.7)])
 def test_constant_skewed_field_gives_straight_lines_up_to_the_border(u, beta):
     field = field_of(np.ones((12, 17)), lambda x, _: u + 0 * x, lambda x, _: beta + 0 * x, stroke=40)
     lines = streamlines(field, 1.0)
@@ -84,9 +73,9 @@ def test_constant_skewed_field_gives_straight_lines_up_to_the_border(u, beta):
             assert not (-0.5 <= beyond[0] <= 16.5 and -11.5 <= beyond[1] <= 0.5)
 
 
-@pytest.mark.parametrize("size", [47, 48])
+@for_each("size", [27, 28])
 def test_concentric_field_gives_circles_and_rays(size):
-    field = field_of(square(size), lambda x, y: np.arctan2(y, x) + np.pi / 2, zero)
+    field = field_of(square(size), lambda x, y: np.arctan2(y, x) + np.pi / 2)
     middle = np.array([(size - 1) / 2, -(size - 1) / 2])
     circles = rays = 0
     for line in streamlines(field, 1.5):
@@ -103,8 +92,8 @@ def test_concentric_field_gives_circles_and_rays(size):
         else:
             rays += 1
             assert (np.ptp(angle) * radius).max() < 0.3
-    assert circles > 8
-    assert rays > 40
+    assert circles > 4
+    assert rays > 20
 
 
 def test_lines_stay_inside_the_mask_and_reach_every_part():
@@ -114,20 +103,19 @@ def test_lines_stay_inside_the_mask_and_reach_every_part():
     field = waves(mask)
     assert field.instance.grid.parts == 2
     lines = streamlines(field, 1.5)
-    row, column = pixels_under(field, all_points(lines))
+    row, column = pixels_under(all_points(lines))
     assert mask[row, column].all()
     assert np.abs(all_points(lines) - np.stack([column, -row], axis=1)).max() <= 0.5
     for part in (across < 29, across >= 29):
         for family in (0, 1):
-            ways = [line.points for line in lines if line.families[0] == family]
-            points = np.concatenate(ways)
+            points = all_points([line for line in lines if line.families[0] == family])
             centre = np.argwhere(mask & part)[:, ::-1] * [1, -1]
             assert np.quantile(cKDTree(points).query(centre)[0], 0.99) < 1.5
 
 
-@pytest.mark.parametrize("separation", [0.7, 1.3, 4.0])
-def test_lines_of_a_family_keep_their_distance_and_leave_no_gap(separation):
-    field = waves(square(30))
+@for_each("separation", [0.7, 1.3, 4.0])
+def test_lines_of_a_family_keep_their_distance_and_leave_no_gap_whatever_the_labels(separation):
+    field = random_labels(waves(square(20)))
     lines = streamlines(field, separation)
     assert all(len(set(line.families.tolist())) == 1 for line in lines)  # nothing forces a cut
     centres = np.stack([field.instance.grid.columns, -field.instance.grid.rows], axis=1)
@@ -141,7 +129,7 @@ def test_lines_of_a_family_keep_their_distance_and_leave_no_gap(separation):
 
 
 def test_spirals_keep_their_distance_from_themselves():
-    field = field_of(square(40), lambda x, y: np.arctan2(y, x) + 1.55, zero)
+    field = field_of(square(40), lambda x, y: np.arctan2(y, x) + 1.55)
     longest = max(streamlines(field, 2.0), key=lambda line: length_of(line.points))
     points = longest.points
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
@@ -150,19 +138,23 @@ def test_spirals_keep_their_distance_from_themselves():
     assert (np.abs(along[pairs[:, 0]] - along[pairs[:, 1]]) <= 3 * CLOSEST * 2.0 + 1e-9).all()
 
 
-@pytest.mark.parametrize("index", [0.25, -0.25])
-def test_lines_end_at_a_singularity(index):
-    field = quarter(25, index, 0.45, 0.55)
+@for_each("index", [0.25, -0.25])
+def test_lines_end_at_a_singularity_and_labels_are_cut_from_there_to_the_border(index):
+    field = quarter(15, index, 0.45, 0.55)
     singularities = field.singularities
     assert singularities.index.tolist() == [index]
     centre = np.array([singularities.column[0] + 0.5, -singularities.row[0] - 0.5])
     away = np.abs(all_points(streamlines(field, 0.7)) - centre).max(axis=1)
     assert 0.5 - 1e-9 < away.min() < 0.8
+    assert 5 <= (align_labels(field).p % 2 == 1).sum() <= 20
 
 
 def test_lines_end_where_the_two_lines_are_one():
-    field = field_of(square(30), zero, lambda x, y: 0.95 * np.exp(-(x**2 + y**2) / 60), stroke=5)
-    row, column = pixels_under(field, all_points(streamlines(field, 1.0)))
+    def skew(x, y):
+        return np.minimum(0.95 * np.exp(-(x**2 + y**2) / 60), np.pi / 4)
+
+    field = field_of(square(24), lambda x, _: 0.0 * x, skew, stroke=5)
+    row, column = pixels_under(all_points(streamlines(field, 1.0)))
     picture = field.image(field.degenerate) > 0
     deep = picture.copy()
     for axis in (0, 1):
@@ -172,28 +164,10 @@ def test_lines_end_where_the_two_lines_are_one():
     assert (~picture)[row, column].any()
 
 
-def test_combing_keeps_the_crosses_and_cuts_only_where_it_must():
-    smooth = random_labels(waves(square(20)), 2)
-    calm = align_labels(smooth)
-    assert (calm.p % 2 == 0).all()
-    np.testing.assert_allclose(
-        smooth.cross_error(calm.alpha + calm.beta, calm.alpha + np.pi / 2 - calm.beta), 0, atol=1e-7
-    )
-    assert calm.energy().smooth == pytest.approx(smooth.energy().smooth)
-    single = align_labels(quarter(24, 0.25))
-    assert 8 <= (single.p % 2 == 1).sum() <= 30  # from the middle to the border
-    np.testing.assert_array_equal(single.singularities.index, [0.25])
-
-
-@pytest.mark.parametrize("shape", [(1, 1), (1, 6), (5, 1)])
+@for_each("shape", [(1, 1), (1, 6), (5, 1)])
 def test_tiny_grids_have_streamlines(shape):
-    field = field_of(np.ones(shape), lambda x, _: 0.6 + 0 * x, zero)
-    lines = streamlines(field, 0.3)
+    lines = streamlines(field_of(np.ones(shape), lambda x, _: 0.6 + 0 * x), 0.3)
     assert {int(line.families[0]) for line in lines} == {0, 1}
-    pixels_under(field, all_points(lines))
-
-
-@pytest.mark.parametrize("separation", [0.0, -1.0, float("nan"), float("inf"), 1e-6])
-def test_bad_separation_is_named(separation):
-    with pytest.raises(InputError, match="separation"):
-        streamlines(field_of(square(4), zero, zero), separation)
+    row, column = pixels_under(all_points(lines))
+    assert 0 <= row.min() <= row.max() < shape[0]
+    assert 0 <= column.min() <= column.max() < shape[1]

@@ -6,7 +6,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.programs.casadi import FEASIBLE, IterateWatch, ca, read_nl
+from crossfield.export.programs.casadi import FEASIBILITY, IterateWatch, ca, read_nl
 from crossfield.export.programs.casadi import solve_model as solve
 from crossfield.export.programs.protocol import RefusedError
 from crossfield.export.writing.nl_order import NlOrder
@@ -46,7 +46,7 @@ def test_only_feasible_points_that_are_lower_are_kept(relaxed):
     lower = problem.point(cf.power_field(problem.instance))
     worse, broken = problem.point(cf.greedy_field(problem.instance)), lower.copy()
     worse[problem.blocks["s"].slice] += 0.1
-    broken[problem.blocks["s"].slice] -= 10 * FEASIBLE
+    broken[problem.blocks["s"].slice] -= 10 * FEASIBILITY
     start = watch.value
     assert seen(worse[order]) == seen(broken[order]) == start
     assert seen(lower[order]) == pytest.approx(problem.objective_value(lower))

@@ -6,15 +6,8 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.export.cli.app import invoke
-from crossfield.export.formats.registry import write
 from crossfield.export.runs.methods import METHODS, Request
-from crossfield.export.runs.proven import certify
-from crossfield.export.solving.local import SolveFiles, Solvers
-from crossfield.models.errors import SolverError
 from crossfield.models.processes.deadline import Deadline
-from crossfield.models.processes.limits import Limits
-from crossfield.models.proof.certificate import write_certificate
-from crossfield.models.search.greedy import greedy_field
 from folders import contents
 
 
@@ -37,7 +30,7 @@ LATE = {"greedy": 8, "power": 4, "polyvector": 4, "bend": 4, "search": 40, "prov
 @pytest.mark.parametrize("seconds", [0.5, 6.0, 20.0])
 def test_a_method_ends_at_its_limit_with_a_valid_field(method, seconds, tmp_path):
     clock = Ticking()
-    request = Request(cf.sample("mouse", 12), tmp_path, Limits(seconds, threads=1), clock=clock)
+    request = Request(cf.sample("mouse", 12), tmp_path, cf.Limits(seconds, threads=1), clock=clock)
     *_, candidate = METHODS[method].find(request)
     assert clock.now <= 1 + seconds + LATE[method]
     assert np.isfinite(candidate.field.energy().total)
@@ -46,45 +39,25 @@ def test_a_method_ends_at_its_limit_with_a_valid_field(method, seconds, tmp_path
     assert (np.abs(candidate.field.beta) <= np.pi / 4 + 1e-12).all()
 
 
-def test_two_stages_without_time_return_the_start(tmp_path):
-    start = greedy_field(cf.sample("mouse", 12))
-    request = Request(start.instance, tmp_path, Limits(1e-3), start=start, clock=Ticking())
-    (only,) = METHODS["two-stage"].find(request)
-    assert only.field.energy(1).total == pytest.approx(start.energy(1).total, rel=1e-9)
+def test_a_solver_states_whether_it_returned_its_start_and_the_gap_of_another_point():
+    problem = cf.formulate(cf.sample("skew", 4), "milp-mccormick")
+    start = cf.power_field(problem.instance).with_best_jumps()
+    given_back = cf.solve(problem, limits=cf.Limits(1e-6), start=start)
+    assert (given_back.start_returned, given_back.gap) == (True, None)
+    solved = cf.solve(problem, limits=cf.Limits(60, threads=1), start=start)
+    assert (str(solved.status), solved.start_returned) == ("optimal-global", False)
+    assert solved.gap == pytest.approx((solved.objective - solved.bound) / solved.objective)
+    assert solved.gap < 1e-3
 
 
-def test_a_solver_process_is_told_seconds_and_no_time_of_this_clock(tmp_path):
-    """The deadline is far away, although its clock began long after that of other processes."""
-    field = greedy_field(cf.sample("mouse", 6))
-    problem = cf.formulate(field.instance, "qp-fixed", p=field.p)
-    held = write(problem, tmp_path / "model.nl", start=field).problem
-    files, deadline = (
-        SolveFiles.for_model(tmp_path / "model.nl", "ipopt"),
-        Deadline.after(600.0, lambda: -1e9),
-    )
-    with Solvers() as solvers:
-        solvers.solve_file(held, "ipopt", files, Limits(600.0), deadline, start=field)
-    first = files.log.read_text().splitlines()[0]
-    assert 500 < float(first.rpartition("at most ")[2].removesuffix(" s")) <= 600
+UNPROVEN = "nothing was proven, and there is no certificate: it ended (time) before a bound was proven"
 
 
-UNPROVEN = "nothing was proven, and there is no certificate: the time limit ended before a bound was proven"
-
-
-@pytest.fixture
-def passed():
-    """A deadline in the past."""
-    return Deadline(0.0, lambda: 1.0)
-
-
-def test_a_proof_without_time_has_no_bound_and_no_certificate(passed, tmp_path):
-    proof = cf.prove(cf.sample("mouse", 24), limits=cf.Limits().until(passed))
+def test_a_proof_without_time_has_no_bound_and_no_certificate(tmp_path):
+    proof = cf.prove(cf.sample("mouse", 24), limits=cf.Limits().until(Deadline(0.0, lambda: 1.0)))
     assert (proof.bound, proof.status, proof.levels, proof.ended) == (0.0, "gap", (), "time")
-    path = tmp_path / "certificate.npz"
-    with pytest.raises(SolverError, match="nothing was proven"):
-        write_certificate(proof, path)
-    with pytest.raises(SolverError, match=UNPROVEN):
-        certify(proof, path)
+    with pytest.raises(cf.SolverError, match="nothing was proven"):
+        cf.write_certificate(proof, tmp_path / "certificate.npz")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -99,3 +72,11 @@ def test_the_command_prove_reports_that_nothing_was_proven(norm, tmp_path, capsy
     assert document == json.loads((tmp_path / "mouse.proof.json").read_text())
     assert (document["status"], document["bound"], document["levels"]) == ("unproven", 0.0, [])
     assert contents(tmp_path).keys() == {"mouse.proof.field.npz", "mouse.proof.json"}
+    if norm == "1":
+        return
+    field = cf.read_field(tmp_path / "mouse.proof.field.npz")
+    better = cf.search(field.instance, start=field, rounds=0, jobs=1).field
+    cf.write_field(better, tmp_path / "mouse.proof.field.npz")
+    before = contents(tmp_path)
+    assert invoke([*command, "-o", str(tmp_path)]) == 1
+    assert contents(tmp_path) == before  # a report stays with the better field

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
-from functools import partial
+from html import unescape
 
 import crossfield as cf
 import pytest
 from browsing import CONTRAST, find, served, show, sideways
-from crossfield.export.bundle.problem_files import write_all
 from crossfield.export.cli.app import invoke
-from crossfield.export.formats.registry import DEFAULTS, FORMATS, Format
-from crossfield.export.runs import run
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("run")
-    cf.run(cf.sample("mouse", 10), folder, limits=cf.Limits(0.5), drawing="mouse")
-    return folder
+@pytest.fixture
+def folder(two_parts):
+    return two_parts[0]
 
 
 @pytest.fixture
@@ -56,10 +52,12 @@ def test_it_fits_and_can_be_read(browser, address, width, scheme):
 
 def test_links_lead_to_files_and_nothing_comes_from_elsewhere(folder):
     page = (folder / "index.html").read_text(encoding="utf-8")
-    links = re.findall(r'href="([^"]+)"', page)
+    links = re.findall(r'href="((?!data:)[^"]+)"', page)
     assert len(links) > 34
     assert [link for link in links if not (folder / link).exists()] == []
     assert re.findall(r'(?:src|href)="(?:https?:)?//', page) == []
+    report = json.loads((folder / "report.json").read_text())
+    assert all(doubt in unescape(page) for doubt in report["surface"]["doubts"])
 
 
 def test_the_line_that_reads_an_answer_back_reads_it(folder, monkeypatch):
@@ -85,32 +83,3 @@ def test_the_first_line_works_with_what_a_plain_installation_has(folder, monkeyp
     assert program == "crossfield"
     assert invoke([*arguments, "--time-limit", "2"]) == 0
     assert list((folder / arguments[-1]).glob("*.field.npz"))
-
-
-def test_a_new_default_format_needs_no_other_edit(tmp_path, monkeypatch):
-    """Its entry in the table is enough; without a command in it, the page has the line that reads."""
-    monkeypatch.setitem(FORMATS, "ninth", Format("ninth", "LP by another name", 2, "lp"))
-    monkeypatch.setattr(run, "write_all", partial(write_all, formats=(*DEFAULTS, "ninth")))
-    cf.run(cf.sample("mouse", 4), tmp_path, limits=cf.Limits(0.1))
-    page = (tmp_path / "index.html").read_text(encoding="utf-8")
-    assert "mouse.milp-mccormick.ninth" in page
-    assert re.search(r"<pre[^>]*>crossfield read mouse.milp-mccormick.sol --manifest models/", page)
-
-
-def test_a_doubted_surface_and_warnings_are_explained(tmp_path):
-    square = '<path stroke="black" d="M5 47V5H95V95H5V54"/><path stroke="black" d="M120 5V95"/>'
-    lines = "".join(
-        f'<path stroke="red" d="M{x} 10V90"/><path stroke="red" d="M10 {x}H90"/>' for x in (30, 60)
-    )
-    drawing = tmp_path / "flat.svg"
-    drawing.write_text(
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="130" height="100" fill="none">{square}{lines}</svg>'
-    )
-    report = cf.run(
-        cf.read_sketch(drawing, size=40), tmp_path / "out", limits=cf.Limits(0.3), drawing=drawing
-    )
-    page = (tmp_path / "out" / "index.html").read_text(encoding="utf-8")
-    assert report.surface.doubts
-    assert report.instance.reading.warnings
-    for sentence in (*report.surface.doubts, *report.instance.reading.warnings):
-        assert sentence in page

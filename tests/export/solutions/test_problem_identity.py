@@ -7,7 +7,7 @@ import crossfield as cf
 import pytest
 from crossfield.export.cli.app import invoke
 from crossfield.export.runs.methods import METHODS, Request
-from crossfield.export.solutions.readers.registry import parse_raw, read_raw
+from crossfield.export.solutions.readers.registry import parse_raw
 from crossfield.models.search.starts import first_field
 
 
@@ -24,8 +24,8 @@ def solved(ring, tmp_path_factory):
     """Folders written by `export` and by `solve`, for the same instance and arguments."""
     folder = tmp_path_factory.mktemp("ring")
     path = str(cf.write_instance(ring, folder / "ring.json"))
-    assert invoke(["export", path, "-f", "qp-fixed", "-o", str(folder / "files"), "-q"]) == 0
-    assert invoke(["solve", path, "--formulation", "qp-fixed", "-o", str(folder / "solved"), "-q"]) == 0
+    assert invoke(["export", path, "-f", "qp-fixed", "-o", str(folder / "files")]) == 0
+    assert invoke(["solve", path, "--formulation", "qp-fixed", "-o", str(folder / "solved")]) == 0
     return folder
 
 
@@ -35,35 +35,40 @@ def only(folder: Path, pattern: str) -> Path:
 
 
 def read(solution: Path, manifest: Path, field: Path) -> int:
-    return invoke(["read", str(solution), "--manifest", str(manifest), "-o", str(field), "-q"])
+    return invoke(["read", str(solution), "--manifest", str(manifest), "-o", str(field)])
 
 
-def test_export_and_solve_fix_the_same_jumps(solved, ring, tmp_path):
+def test_export_and_solve_fix_the_same_jumps_and_either_manifest_reads_the_answer(solved, ring, tmp_path):
     solution = only(solved / "solved", "*.ipopt.sol")
-    manifest = only(solved / "files", "*.manifest.json")
-    assert read(solution, manifest, tmp_path / "field.npz") == 0
-    energy = cf.read_field(tmp_path / "field.npz").energy().total
-    assert energy == pytest.approx(cf.read_field(only(solved / "solved", "*.field.npz")).energy().total)
-    assert cf.read_manifest(manifest).problem().jumps.tolist() == first_field(ring).p.tolist()
+    expected = cf.read_field(only(solved / "solved", "*.field.npz")).energy().total
+    for number, folder in enumerate(("files", "solved")):
+        manifest = cf.read_manifest(only(solved / folder, "*.manifest.json"))
+        assert manifest.problem().jumps.tolist() == first_field(ring).p.tolist()
+        assert (manifest.folder / manifest.document["instance"]["file"]).is_file()
+        assert read(solution, manifest.path, tmp_path / f"{number}.npz") == 0
+        assert cf.read_field(tmp_path / f"{number}.npz").energy().total == pytest.approx(expected)
 
 
-def test_solve_leaves_the_manifest_that_reads_its_solution(solved, tmp_path):
-    manifest = cf.read_manifest(only(solved / "solved", "*.manifest.json"))
-    assert read(only(solved / "solved", "*.ipopt.sol"), manifest.path, tmp_path / "field.npz") == 0
-    assert {file["name"].rpartition(".")[2] for file in manifest.document["files"]} == {"nl", "row", "col"}
-    assert (manifest.folder / manifest.document["instance"]["file"]).is_file()
+def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
+    """A field of energy 15.5 came of an optimum of 1e-6: columns alike, fixed jumps different."""
+    problem = cf.formulate(ring, "qp-fixed", p=cf.greedy_field(ring).p)
+    other = cf.write(problem, tmp_path / "files", formats=["nl"])
+    assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
+    assert "is of another problem" in capsys.readouterr().err
+    assert not (tmp_path / "field.npz").exists()
 
 
 def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
     """A manifest keeps the other files of the same problem, and drops those of another."""
-    shutil.copytree(solved / "files", tmp_path / "both")
-    instance = only(tmp_path / "both", "*.instance.json")
+    folder = tmp_path / "both"
+    shutil.copytree(solved / "files", folder)
+    instance = only(folder, "*.instance.json")
 
     def listed():
-        manifest = cf.read_manifest(only(tmp_path / "both", "*.manifest.json"))
+        manifest = cf.read_manifest(only(folder, "*.manifest.json"))
         return sorted(Path(file["name"]).suffix for file in manifest.document["files"])
 
-    arguments = ["solve", str(instance), "--formulation", "qp-fixed", "-o", str(tmp_path / "both"), "-q"]
+    arguments = ["solve", str(instance), "--formulation", "qp-fixed", "-o", str(folder)]
     assert invoke(arguments) == 0
     assert listed() == [".col", ".gms", ".lp", ".mps", ".nl", ".row"]
     greedy = cf.write_field(cf.greedy_field(cf.read_instance(instance)), tmp_path / "greedy.npz")
@@ -71,36 +76,22 @@ def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
     assert listed() == [".col", ".nl", ".row"]
 
 
-def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
-    """A field of energy 15.5 came of an optimum of 1e-6: columns alike, fixed jumps different."""
-    other = cf.write_problem(
-        cf.formulate(ring, "qp-fixed", p=cf.greedy_field(ring).p), tmp_path / "files", formats=["nl"]
-    )
-    assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
-    assert "is of another problem" in capsys.readouterr().err
-    assert not (tmp_path / "field.npz").exists()
-
-
-def test_the_answers_of_gams_carry_the_stamp(ring, tmp_path):
-    """A file of an older model has no such line and is read all the same."""
-    problem = cf.formulate(ring, "milp-mccormick")
-    cf.write(problem, tmp_path / "model.gms")
-    assert f"put 'problem,{problem.stamp}' /;" in (tmp_path / "model.gms").read_text()
-    old = b"model_status,1\nsolver_status,1\nobjective, 2.0\nx, 1.0\n"
-    new = old.replace(b"objective", f"problem,{problem.stamp}\nobjective".encode())
-    (tmp_path / "new.csv").write_bytes(new)
-    assert parse_raw(old).objective == parse_raw(new).objective == 2.0
-    assert read_raw(tmp_path / "new.csv").stamps == {problem.stamp.removeprefix("sha256_")}
-
-
-def test_a_stamp_begins_the_hash_of_the_manifest(ring, tmp_path):
+def test_a_stamp_begins_the_hash_of_the_manifest_in_all_files(ring, tmp_path):
     """Also in files that hold the problem with products lifted: they are of the same problem."""
     problem = cf.formulate(ring, "minlp-quartic")
-    manifest = cf.write_problem(problem, tmp_path, formats=["mps"])
+    manifest = cf.write(problem, tmp_path, formats=["mps", "gms"])
     stamp = f"sha256_{manifest.document['sha256'][:11]}"
-    held = cf.write(problem, tmp_path / "a.mps").problem
-    assert problem.stamp == held.stamp == stamp
-    assert f"NAME {ring.name}_{stamp} FREE\n" in (tmp_path / "a.mps").read_text()
+    assert problem.stamp == problem.lifted.stamp == stamp
+    assert f"NAME {ring.name}_{stamp} FREE\n" in only(tmp_path, "*.mps").read_text()
+    assert f"put 'problem,{stamp}' /;" in only(tmp_path, "*.gms").read_text()
+
+
+def test_the_answers_of_gams_carry_the_stamp():
+    """A file of an older model has no such line and is read all the same."""
+    old = b"model_status,1\nsolver_status,1\nobjective, 2.0\nx, 1.0\n"
+    new = parse_raw(old.replace(b"objective", b"problem,sha256_1a2b3c4d5e6\nobjective"))
+    assert parse_raw(old).objective == new.objective == 2.0
+    assert (parse_raw(old).stamps, new.stamps) == (set(), {"1a2b3c4d5e6"})
 
 
 def test_a_run_leaves_manifests_beside_its_solves(ring, tmp_path):

@@ -28,15 +28,6 @@ def test_a_server_that_hangs_is_reported_and_the_page_recovers(browser, tmp_path
         assert find(settled(browser), "#status").text == ""
 
 
-def test_a_server_that_stops_while_it_computes_is_reported(browser, tmp_path):
-    with studio() as page:
-        opened(browser, page.address)
-        find(browser, "#file").send_keys(str(write(tmp_path / "a.json", PEBBLE | {"size": 256})))
-        until(browser, lambda _: find(browser, "#numbers").text)
-        page.stop()
-        until(browser, lambda _: "does not answer" in banner(browser))
-
-
 def test_a_process_that_is_killed_is_reported_with_a_remedy(browser, tmp_path):
     with studio() as page:
         opened(browser, page.address)

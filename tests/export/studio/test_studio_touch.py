@@ -7,7 +7,7 @@ import time
 import pytest
 from browsing import find, show
 from crossfield.export.pictures.palette import LIGHT
-from studio_pages import BOX, document, drag, pebble, settled, tool, until
+from studio_pages import BOX, document, drag, pebble, press, settled, tool, until
 from studios import PEBBLE
 
 pytestmark = pytest.mark.slow
@@ -232,7 +232,7 @@ def test_marking_a_selected_stroke_leaves_the_pen_as_it_is(empty):
     assert [each["mark"] for each in document(empty)["strokes"]] == ["ignored", "cut"]
 
 
-def test_strokes_end_at_the_border_of_the_page(empty):
+def test_strokes_end_at_the_border_of_the_page_and_stay_on_it_when_moved(empty):
     _, _, wide, high = document(drag(empty, [(200, 300), (300, 310)]))["page"]
     drag(empty, [(300, 350), (20, 340), (-300, 340), (-300, 380), (20, 380), (300, 390)])
     _, out, back = spots(empty)
@@ -240,12 +240,13 @@ def test_strokes_end_at_the_border_of_the_page(empty):
     for points in spots(empty):
         assert all(0 <= x <= wide for x in points[::2])
         assert all(0 <= y <= high for y in points[1::2])
+    tool(empty, "select")
+    drag(empty, [(250, 305), (250, 305)])
+    drag(empty, [(250, 305), (300, 305), (1000, 305)])
+    assert max(spots(empty)[0]) == pytest.approx(wide, abs=0.001)
 
 
 def test_selected_strokes_are_moved_copied_and_pasted_with_undo(empty):
-    from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.keys import Keys
-
     drag(empty, [(100, 300), (200, 300), (300, 300)])
     states = [spots(empty)]
     tool(empty, "select")
@@ -259,24 +260,17 @@ def test_selected_strokes_are_moved_copied_and_pasted_with_undo(empty):
         assert len(states[-1]) == count
         assert states[-1] != states[-2]
 
-    def press(*keys, control=False):
-        actions = ActionChains(empty)
-        if control:
-            actions.key_down(Keys.CONTROL)
-        actions.send_keys(*keys).key_up(Keys.CONTROL).perform()
-
     check(lambda: drag(empty, [(200, 300), (210, 320), (220, 340)]))
     down = [b - a for a, b in zip(states[0][0], states[1][0], strict=True)]
     assert down[1] == pytest.approx(2 * down[0])
-    check(lambda: press(Keys.ARROW_DOWN))
+    check(lambda: press(empty, "ARROW_DOWN"))
     assert states[-1][0][::2] == states[-2][0][::2]
-    check(lambda: press(Keys.ARROW_LEFT * 3))
-    press("c", control=True)
-    check(lambda: press("v", control=True), 2)
+    press(empty, "c", control=True)
+    check(lambda: press(empty, "v", control=True), 2)
     check(lambda: find(empty, "#paste").click(), 3)
     assert find(empty, "#selected").text == "1 selected"
-    check(lambda: press("x", control=True), 2)
-    check(lambda: press("v", control=True), 3)
+    check(lambda: press(empty, "x", control=True), 2)
+    check(lambda: press(empty, "v", control=True), 3)
     drag(empty, [(230, 250), (230, 250)])
     for _ in range(9):
         find(empty, "#undo").click()
@@ -289,24 +283,11 @@ def test_selected_strokes_are_moved_copied_and_pasted_with_undo(empty):
 
 
 def test_the_keyboard_alone_moves_a_stroke(empty):
-    from selenium.webdriver.common.action_chains import ActionChains
-    from selenium.webdriver.common.keys import Keys
-
     empty.execute_script("document.querySelector('#drawing').focus()")
-    across = [Keys.ARROW_LEFT * 10, Keys.SPACE, Keys.ARROW_RIGHT * 20, Keys.SPACE, Keys.ARROW_LEFT * 5]
-    ActionChains(empty).send_keys(*across).perform()
+    left, right = (["ARROW_LEFT"] * 10, ["ARROW_RIGHT"] * 20)
+    press(empty, *left, "SPACE", *right, "SPACE", *left[:5])
     (before,) = spots(settled(empty))
-    moving = ["v", Keys.ENTER, Keys.SPACE, Keys.ARROW_DOWN * 3, Keys.SPACE]
-    ActionChains(empty).send_keys(*moving).perform()
+    press(empty, "v", "ENTER", "SPACE", *["ARROW_DOWN"] * 3, "SPACE")
     (after,) = spots(settled(empty))
     assert after[::2] == before[::2]
     assert after[1] > before[1]
-
-
-def test_a_moved_stroke_stays_on_the_page(empty):
-    _, _, wide, _ = document(drag(empty, [(100, 300), (200, 300), (300, 300)]))["page"]
-    tool(empty, "select")
-    drag(empty, [(200, 300), (200, 300)])
-    drag(empty, [(200, 300), (300, 300), (1000, 300)])
-    (points,) = spots(empty)
-    assert max(points) == pytest.approx(wide, abs=0.001)

@@ -1,65 +1,34 @@
-"""Directions on triangles for other programs: read by them, and read back."""
+"""Directions on triangles for other programs: read by them, and theirs read on our instances."""
 
 import io
-from dataclasses import replace
 
+import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import InputError, InstanceError, OutputError
-from crossfield.models.field.field import CrossField
-from crossfield.models.field.file import read_field, write_field
-from crossfield.models.field.triangles import mesh_of, vectors_of
-from crossfield.models.instance.angles import HALF
-from crossfield.models.instance.instance import Instance
-from crossfield.models.instance.mesh import Mesh
-from crossfield.models.mesh.shapes import MESHES
 from exhaustive import random_field, random_instance
-from folders import contents
+from loops import for_each
 
-SUFFIXES = ("rawfield", "rosy", "ply", "vtk")
-
-
-def on_mesh(name, *, orthogonal=True, seed=1):
-    rng = np.random.default_rng(seed)
-    mesh = MESHES[name][1]()
-    instance = Instance.on_faces(name, mesh, [0], [0.3], [1.0], orthogonal=orthogonal)
-    beta = np.zeros(mesh.size) if orthogonal else rng.uniform(-0.6, 0.6, mesh.size)
-    field = CrossField(instance, rng.uniform(0, HALF, mesh.size), beta, np.zeros(len(mesh.first), int))
-    return field.with_best_jumps()
+FIELD = random_field(random_instance(1), 1)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
-@pytest.mark.parametrize("orthogonal", [True, False])
-def test_a_field_on_a_mesh_comes_back(suffix, orthogonal, tmp_path):
-    field = on_mesh("cube", orthogonal=orthogonal)
-    back = read_field(write_field(field, tmp_path / f"field.{suffix}"), on=field.instance)
-    beta = field.beta if suffix != "rosy" else 0
-    error = back.cross_error(field.alpha + beta, field.alpha + HALF - beta)
-    assert error == pytest.approx(np.zeros(len(error)), abs=1e-9)
-    if orthogonal:
-        assert back.energy().total == pytest.approx(field.energy().total)
+def on_mesh(name, *, orthogonal=True):
+    rng = np.random.default_rng(1)
+    mesh = cf.sample(name).mesh
+    instance = cf.Instance.on_faces(name, mesh, [0], [0.3], [1.0], orthogonal=orthogonal)
+    u, skew = rng.uniform(0, np.pi, mesh.size), rng.uniform(-1.2, 1.2, mesh.size) * (not orthogonal)
+    return cf.CrossField.from_lines(instance, u, u + np.pi / 2 - skew)
 
 
-@pytest.mark.parametrize("suffix", SUFFIXES)
-def test_a_field_on_pixels_comes_back(suffix, tmp_path):
-    field = random_field(random_instance(3), 3)
-    if suffix == "rosy":
-        field = CrossField(replace(field.instance, orthogonal=True), field.alpha, 0 * field.beta, field.p)
-    back = read_field(write_field(field, tmp_path / f"field.{suffix}"), on=field.instance)
-    error = back.cross_error(field.u_angle, field.v_angle)
-    assert error == pytest.approx(np.zeros(len(error)), abs=1e-9)
-
-
-def test_directions_do_not_depend_on_the_first_corner_of_a_face():
-    field = on_mesh("pin")
-    mesh, instance = field.instance.mesh, field.instance
-    turned = replace(mesh, faces=np.roll(mesh.faces, 1, axis=1))
-    angles = turned.angle_in(np.arange(mesh.size), vectors_of(field)[:, 0])
-    other = CrossField.from_lines(replace(instance, domain=turned), angles, angles + HALF)
-    same = np.abs(np.einsum("kc,klc->kl", vectors_of(other)[:, 0], vectors_of(field))).max(axis=1)
-    assert same == pytest.approx(np.ones(mesh.size))
-    assert other.energy().smooth == pytest.approx(field.energy().smooth)
-    assert other.singularities.index.sum() == mesh.euler_characteristic
+def vectors_on(field):
+    """Directions (faces, 2, 3) of a field on a mesh, by hand: angles from the first edge of each face."""
+    mesh = field.instance.mesh
+    one, two, three = mesh.vertices[mesh.faces].transpose(1, 0, 2)
+    first = (two - one) / np.linalg.norm(two - one, axis=1)[:, None]
+    normal = np.cross(two - one, three - one)
+    second = np.cross(normal / np.linalg.norm(normal, axis=1)[:, None], first)
+    angles = np.stack([field.alpha + field.beta, field.alpha + np.pi / 2 - field.beta])
+    cosine, sine = np.cos(angles)[..., None], np.sin(angles)[..., None]
+    return (cosine * first + sine * second).transpose(1, 0, 2)
 
 
 @pytest.mark.needs("trimesh")
@@ -67,77 +36,130 @@ def test_trimesh_reads_the_ply_with_its_directions(tmp_path):
     import trimesh
 
     field = on_mesh("flange")
-    path = write_field(field, tmp_path / "field.ply")
+    path = cf.write_field(field, tmp_path / "field.ply")
     read = trimesh.load(io.BytesIO(path.read_bytes()), file_type="ply", process=False)
     np.testing.assert_array_equal(read.faces, field.instance.mesh.faces)
     np.testing.assert_allclose(read.vertices, field.instance.mesh.vertices)
     rows = read.metadata["_ply_raw"]["face"]["data"]
     vectors = np.stack([rows[name] for name in ("ux", "uy", "uz", "vx", "vy", "vz")], axis=1)
-    np.testing.assert_allclose(vectors.reshape(-1, 2, 3), vectors_of(field))
+    np.testing.assert_allclose(vectors.reshape(-1, 2, 3), vectors_on(field), atol=1e-7)
 
 
 @pytest.mark.needs("pyvista")
 def test_vtk_reads_the_vtk_with_directions_and_indices(tmp_path):
     import pyvista
 
-    for field in (on_mesh("cube", orthogonal=False), random_field(random_instance(3), 3)):
-        read = pyvista.read(write_field(field, tmp_path / "field.vtk"))
-        mesh = mesh_of(field.instance)
-        np.testing.assert_array_equal(read.regular_faces, mesh.faces)
-        np.testing.assert_allclose(np.asarray(read.points), mesh.vertices)
-        np.testing.assert_allclose(np.asarray(read.cell_data["u"]), vectors_of(field)[:, 0])
-        np.testing.assert_allclose(np.asarray(read.cell_data["v"]), vectors_of(field)[:, 1])
-        total = field.singularities.index.sum()
-        assert np.asarray(read.point_data["index"]).sum() == pytest.approx(total)
+    field = on_mesh("cube", orthogonal=False)
+    read = pyvista.read(cf.write_field(field, tmp_path / "field.vtk"))
+    np.testing.assert_array_equal(read.cells_dict[pyvista.CellType.TRIANGLE], field.instance.mesh.faces)
+    np.testing.assert_allclose(np.asarray(read.points), field.instance.mesh.vertices)
+    directions = np.stack([np.asarray(read.cell_data[name]) for name in "uv"], axis=1)
+    np.testing.assert_allclose(directions, vectors_on(field), atol=1e-7)
+    for each in (field, FIELD):
+        index = np.asarray(pyvista.read(cf.write_field(each, tmp_path / "f.vtk")).point_data["index"])
+        assert index.sum() == pytest.approx(each.singularities.index.sum())
 
 
-@pytest.mark.parametrize(
-    "suffix, old, new, message",
+# Raw fields of other programs on our mesh
+
+
+def raw(vectors):
+    rows = "\n".join(" ".join(map(repr, row)) for row in vectors.reshape(len(vectors), 12).tolist())
+    return f"4 {len(vectors)}\n{rows}\n"
+
+
+def our_vectors(tmp_path):
+    rows = cf.write_field(FIELD, tmp_path / "ours.rawfield").read_text().splitlines()[1:]
+    return np.array([row.split() for row in rows], dtype=float).reshape(-1, 4, 3)
+
+
+def error_of(text, tmp_path):
+    (tmp_path / "theirs.rawfield").write_text(text)
+    read = cf.read_field(tmp_path / "theirs.rawfield", on=FIELD.instance)
+    return read.cross_error(FIELD.u_angle, FIELD.v_angle)
+
+
+@for_each("scale", [1e-300, 1.0, 1e300])
+def test_length_and_order_of_the_vectors_do_not_matter(scale, tmp_path):
+    rng, ours = np.random.default_rng(5), our_vectors(tmp_path)
+    for vectors in (ours, ours[::2]):  # two triangles per pixel, or one
+        theirs = np.round(np.stack([row[rng.permutation(4)] for row in vectors]), 12)
+        theirs = theirs * scale * rng.uniform(0.5, 2, (len(theirs), 4, 1))
+        assert error_of(raw(theirs), tmp_path) == pytest.approx(np.zeros(FIELD.instance.grid.size), abs=1e-9)
+
+
+def test_a_pixel_gets_the_lines_between_those_of_its_triangles(tmp_path):
+    vectors = our_vectors(tmp_path)
+    for side, turn in enumerate((0.1, -0.1)):
+        matrix = np.array([[np.cos(turn), np.sin(turn), 0], [-np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
+        vectors[side::2] = vectors[side::2] @ matrix
+    vectors[1::2] = np.roll(vectors[1::2], 2, axis=1)
+    far = np.pi / 2 - 2 * np.abs(FIELD.beta) > 0.3
+    assert far.any()
+    assert error_of(raw(vectors), tmp_path)[far] == pytest.approx(np.zeros(far.sum()), abs=1e-9)
+
+
+@for_each("suffix, digits, encoding", [("rawfield", "%.6g", "utf-8-sig"), ("rosy", "%.6f", "utf-16")])
+def test_meshes_and_vectors_of_six_digits_fit(suffix, digits, encoding, tmp_path):
+    """Faces of thin triangles turn by more than the digits of their corners."""
+    field = on_mesh("flange")
+    mesh = field.instance.mesh
+    rounded = cf.Mesh(np.round(mesh.vertices, 6), mesh.faces)
+    instance = cf.Instance.on_faces("rounded", rounded, [0], [0.3], [1.0])
+    lines = cf.write_field(field, tmp_path / f"a.{suffix}").read_text().splitlines()
+    rows = [" ".join(digits % float(word) for word in line.split()) for line in lines[2:]]
+    (tmp_path / f"a.{suffix}").write_text("\n".join([*lines[:2], *rows]), encoding=encoding)
+    read = cf.read_field(tmp_path / f"a.{suffix}", on=instance)
+    assert read.cross_error(field.u_angle, field.v_angle).max() < 1e-3
+
+
+def row(*, number=3, text=None, change=None):
+    """A change of one line of a file, counted from 1."""
+
+    def changed(lines):
+        words = lines[number - 1].split()
+        lines[number - 1] = text if change is None else " ".join(change(words))
+        return lines
+
+    return changed
+
+
+def first(word):
+    """Another first number of the third line."""
+    return row(change=lambda words: [word, *words[1:]])
+
+
+@for_each(
+    "suffix, damage, message",
     [
-        ("rosy", "\n4\n", "\n6\n", "line 2: is not 4"),
-        ("rosy", "432\n", "431\n", "its first line states 431"),
-        ("ply", "property double ux\n", "", "no properties ux"),
-        ("vtk", "VECTORS v", "VECTORS w", "no cell vectors u and v"),
-        ("vtk", "VECTORS v", "VECTORS v double\n1 2\nVECTORS x", "has 5 numbers; give 6"),
+        ("rawfield", lambda _: [], "line 1: is '', not the degree 4"),
+        ("rawfield", row(number=1, text="hello"), "line 1: is 'hello', not the degree 4"),
+        ("rawfield", row(number=1, text="2 50"), "line 1: has 2 vectors per face"),
+        ("rawfield", row(number=1, text="4 7"), "line 1: has 7 faces, but"),
+        ("rawfield", lambda lines: lines[:-1], "rows of vectors, but its first line states"),
+        ("rawfield", lambda lines: [*lines, lines[-1]], "rows of vectors, but its first line states"),
+        ("rawfield", row(change=lambda words: words[:11]), "line 3: has 11 numbers; give 12"),
+        ("rawfield", first("nan"), "line 3: holds something other than num"),
+        ("rawfield", first("1_0"), "line 3: holds something other than num"),
+        ("rawfield", first("1e999"), "line 3: holds a number beyond the ran"),
+        ("rawfield", row(change=lambda words: ["0"] * 3 + words[3:]), "line 3: holds a vector of length 0"),
+        ("rawfield", row(change=lambda words: [*words[:2], "1", *words[3:]]), "line 3: has a vector out of"),
+        ("rawfield", row(text="1 0 0 0 1 0 -1 0 0 1 0 0"), "line 3: has no two pairs of opposite vectors"),
+        ("rawfield", lambda _: [" " * 1_000_000], "has 1000000 bytes; at most"),
+        ("rosy", row(number=1, text="431"), "its first line states 431"),
+        ("rosy", row(number=2, text="6"), "line 2: is not 4"),
+        ("rosy", lambda lines: [*lines[:2], *lines[:1:-1]], "as fields of another mesh"),
+        ("rosy", first("0,5"), "write decimal points instead of commas"),
+        ("rosy", first("1.0D+00"), "write exponents with E"),
     ],
 )
-def test_damaged_files_are_refused_with_the_place(suffix, old, new, message, tmp_path):
-    field = on_mesh("cube")
-    path = write_field(field, tmp_path / f"field.{suffix}")
-    path.write_text(path.read_text().replace(old, new, 1))
-    with pytest.raises(InstanceError, match=message):
-        read_field(path, on=field.instance)
-    with pytest.raises(InputError, match="holds no instance"):
-        read_field(path)
-
-
-@pytest.mark.parametrize("suffix", ["ply", "vtk"])
-def test_a_field_of_another_mesh_with_as_many_faces_is_refused(suffix, tmp_path):
-    mesh = Mesh([[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])
-    instance = Instance.on_faces("plate", mesh, [0], [0.3], [1.0])
-    field = CrossField(instance, [0.3, 0.4], [0, 0], [0])
-    path = write_field(field, tmp_path / f"field.{suffix}")
-    others = [
-        replace(mesh, faces=mesh.faces[::-1]),
-        replace(mesh, vertices=2 * mesh.vertices),
-        replace(mesh, vertices=np.append(mesh.vertices, [[5, 5, 5]], axis=0)),
-        Mesh(mesh.vertices[[0, 1, 2, 2, 3, 0]], [[0, 1, 2], [3, 4, 5]]),
-    ]
-    for other in others:
-        with pytest.raises(InstanceError, match=r"field\.\w+: holds another mesh"):
-            read_field(path, on=replace(instance, domain=other))
-    path.write_text(path.read_text().replace("2.0 1.0 0.0", "2.000001 1 0"))  # saved with other digits
-    assert read_field(path, on=instance).alpha == pytest.approx(field.alpha)
-
-
-@pytest.mark.parametrize("suffix", ["rawfield", "rosy"])
-def test_the_mesh_of_the_user_is_not_replaced(suffix, tmp_path):
-    field = on_mesh("cube")
-    theirs = tmp_path / "part.obj"
-    theirs.write_text("# Blender\nvt 0 0\n")
-    with pytest.raises(OutputError, match=r"part.obj: is not crossfield.s, or has changed"):
-        write_field(field, tmp_path / f"part.{suffix}")
-    assert theirs.read_text() == "# Blender\nvt 0 0\n"
-    assert list(contents(tmp_path)) == ["part.obj"]
-    for _ in range(2):  # our own mesh is written again
-        write_field(field, tmp_path / f"field.{suffix}")
+def test_damage_is_named_with_its_line(suffix, damage, message, tmp_path):
+    field = FIELD if suffix == "rawfield" else cf.greedy_field(on_mesh("cube").instance)
+    path = cf.write_field(field, tmp_path / f"field.{suffix}")
+    path.write_text("\n".join(damage(path.read_text().splitlines())))
+    with pytest.raises(cf.InputError if "bytes" in message else cf.InstanceError) as caught:
+        cf.read_field(path, on=field.instance)
+    assert str(caught.value).startswith(str(path))
+    assert message in str(caught.value)
+    with pytest.raises(cf.InputError, match="holds no instance"):
+        cf.read_field(path)

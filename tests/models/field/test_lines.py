@@ -1,84 +1,49 @@
 """Fields from two lines per pixel: the same crosses for all turns and orders, in every gauge."""
 
+import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import InputError
-from crossfield.models.field.field import CrossField
-from crossfield.models.field.jumps import best_jumps
 from crossfield.models.instance.angles import HALF, line_difference
-from crossfield.models.instance.instance import Instance
-from exhaustive import assert_feasible, random_field, random_instance
+from exhaustive import assert_feasible, random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
-from moves import lines
-
-pytestmark = pytest.mark.numeric
-
-SEEDS = st.integers(0, 2**32 - 1)
-GAUGE = st.sampled_from(["strokes", "box"])
 
 
-def assert_inside(field):
-    assert_feasible(field)
-    assert (field.p == best_jumps(field.instance, field.alpha, field.beta)).all()
-
-
-@given(seed=SEEDS, gauge=GAUGE)
-@settings(deadline=None)
-def test_own_lines_give_back_the_crosses_with_no_more_energy(seed, gauge):
-    field = random_field(random_instance(seed, gauge=gauge), seed, beyond=0.2)
-    back = CrossField.from_lines(field.instance, *lines(field))
-    assert_inside(back)
-    assert back.cross_error(*lines(field)) == pytest.approx(np.zeros(len(field.alpha)), abs=1e-9)
-    for norm in (1, 2, "mixed"):
-
-        def settled(crosses, norm=norm):
-            jumps = best_jumps(field.instance, crosses.alpha, crosses.beta, absolute=norm != 2)
-            return CrossField(field.instance, crosses.alpha, crosses.beta, jumps)
-
-        jumps, jumps_back = settled(field), settled(back)
-        assert jumps_back.energy(norm).total <= jumps.energy(norm).total + 1e-9
-
-
-@given(seed=SEEDS, gauge=GAUGE)
-@settings(deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), gauge=st.sampled_from(["strokes", "box"]))
+@settings(max_examples=50)
 def test_turns_and_the_order_of_the_lines_do_not_matter(seed, gauge):
     rng = np.random.default_rng(seed)
     instance = random_instance(seed, gauge=gauge)
     u, v = rng.uniform(-4, 4, (2, instance.grid.size))
-    field = CrossField.from_lines(instance, u, v)
-    assert_inside(field)
+    field = cf.CrossField.from_lines(instance, u, v)
+    assert_feasible(field)
+    assert (field.p == field.with_best_jumps().p).all()
     assert field.cross_error(u, v) == pytest.approx(np.zeros(len(u)), abs=1e-9)
     swap = rng.random(len(u)) < 0.5
     turns = np.pi * rng.integers(-9, 10, (2, len(u)))
-    other = CrossField.from_lines(instance, np.where(swap, v, u) + turns[0], np.where(swap, u, v) + turns[1])
-    assert other.cross_error(*lines(field)) == pytest.approx(np.zeros(len(u)), abs=1e-9)
+    other = cf.CrossField.from_lines(
+        instance, np.where(swap, v, u) + turns[0], np.where(swap, u, v) + turns[1]
+    )
+    assert other.cross_error(field.u_angle, field.v_angle) == pytest.approx(np.zeros(len(u)), abs=1e-9)
     assert other.energy().total == pytest.approx(field.energy().total, abs=1e-9)
-
-
-@given(seed=SEEDS)
-@settings(deadline=None)
-def test_u_is_the_line_nearer_to_the_stroke(seed):
-    instance = random_instance(seed)
-    u, v = np.random.default_rng(seed).uniform(0, np.pi, (2, instance.grid.size))
-    field = CrossField.from_lines(instance, u, v)
-    at = instance.stroke_index
-    off = [line_difference(line[at], instance.target) for line in lines(field)]
-    assert (off[0] <= off[1] + 1e-9).all()
-    assert np.abs(field.residual_r) == pytest.approx(off[0], abs=1e-9)
+    if gauge == "strokes":  # u is the line nearer to the stroke
+        at = instance.stroke_index
+        off = [line_difference(line[at], instance.theta) for line in (field.u_angle, field.v_angle)]
+        assert (off[0] <= off[1] + 1e-9).all()
+        assert np.abs(field.residual_r) == pytest.approx(off[0], abs=1e-9)
 
 
 def test_a_label_on_the_edge_of_the_box_carries_the_stroke():
     for theta in (0.0, HALF):
-        instance = Instance.on_pixels("edge", [[True, True]], [[0, 1]], [theta], [1.0], gauge="box")
-        field = CrossField.from_lines(instance, [0.0, 0.0], [HALF, HALF])
+        instance = cf.Instance.on_pixels("edge", [[True, True]], [[0, 1]], [theta], [1.0], gauge="box")
+        field = cf.CrossField.from_lines(instance, [0.0, 0.0], [HALF, HALF])
         assert field.energy().total == pytest.approx(0)
 
 
 def test_lines_that_are_one_make_a_cross_of_one_line():
-    instance = Instance.on_pixels("one", [[True, True]], [[0, 0]], [0.3], [1.0])
-    field = CrossField.from_lines(instance, [0.3, 1.0], [0.3 + np.pi, 1.0])
+    instance = cf.Instance.on_pixels("one", [[True, True]], [[0, 0]], [0.3], [1.0])
+    field = cf.CrossField.from_lines(instance, [0.3, 1.0], [0.3 + np.pi, 1.0])
     assert field.degenerate.all()
     assert field.angle_between == pytest.approx([0, 0], abs=1e-9)
     assert np.abs(field.residual_r) == pytest.approx([0], abs=1e-9)
@@ -92,11 +57,10 @@ def test_lines_that_are_one_make_a_cross_of_one_line():
         ([0.0, np.nan], "u_angle of pixel 1 is nan, which is not an angle"),
         ([2e6, 0.0], "u_angle of pixel 0 is 2000000.0, which is not an angle"),
         (["a", "b"], "u_angle holds something other than numbers"),
-        ([1j, 0.0], "u_angle holds something other than numbers"),
     ],
 )
 def test_what_is_no_angle_is_refused(u, message):
-    instance = Instance.on_pixels("two", [[True, True]], [[0, 0]], [0.3], [1.0])
-    with pytest.raises(InputError) as caught:
-        CrossField.from_lines(instance, u, [0.0, 0.0])
+    instance = cf.Instance.on_pixels("two", [[True, True]], [[0, 0]], [0.3], [1.0])
+    with pytest.raises(cf.InputError) as caught:
+        cf.CrossField.from_lines(instance, u, [0.0, 0.0])
     assert message in str(caught.value)

@@ -1,4 +1,4 @@
-"""Formulations of orthogonal crosses: the basis of cycles, optima against all jumps, limits, and the file."""
+"""Formulations of orthogonal crosses: the basis of cycles, optima against all jumps, limits, and a file."""
 
 from dataclasses import replace
 
@@ -6,15 +6,8 @@ import crossfield as cf
 import numpy as np
 import pytest
 from bounded_least_squares import least_in_bounds
-from crossfield.export.bundle.problem_files import write_all
-from crossfield.export.cli.app import invoke
-from crossfield.export.formats.registry import write
 from crossfield.export.programs import highs
 from crossfield.export.programs.comparison import algebra_difference
-from crossfield.export.verify.checks import Verdict
-from crossfield.export.verify.verify import verify
-from crossfield.models.errors import FormulationError
-from crossfield.models.formulations.problem import formulate
 from crossfield.models.formulations.residuals import limit_residuals
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.terms import parity_sign
@@ -55,11 +48,6 @@ INSTANCES = {
     "grid": lambda: on_grid(3, (3, 3)),
     "grid with holes": lambda: on_grid(5, None),
 }
-NAMES = ("miqp-orthogonal", "milp-orthogonal", "miqp-cycle", "milp-cycle")
-TINY = ("tetrahedron", "tetrahedron without strokes", "sheet")
-"""Those with few enough independent jumps to try all."""
-
-
 # the basis
 
 
@@ -94,15 +82,6 @@ def test_cycles_are_a_basis_whose_integers_are_free(name):
     assert abs(np.linalg.det(steps[:, : len(chords)][:, chords])) == pytest.approx(1)
 
 
-def test_rings_come_first_and_ten_thousand_faces_are_no_matter():
-    instance = part(torus(100, 50), [])
-    rings, cycles = instance.domain.rings, instance.cycles
-    assert len(cycles.ends) == 10_000 // 2 + 1
-    steps = np.diff(cycles.start)
-    assert (steps[:-2] == np.diff(rings.start)[1:]).all()  # one ring is the sum of the others
-    assert sorted(steps[-2:].tolist()) == [100, 200]  # round the tube, and round the torus
-
-
 # optima
 
 
@@ -127,47 +106,98 @@ def least_of_all_jumps(instance, norm):
     return milp(cost, constraints=(both, goal, goal), bounds=ends, integrality=whole).fun
 
 
-@for_each("name", TINY)
-def test_optima_of_both_formulations_are_the_least_of_all_jumps(name):
-    instance = INSTANCES[name]()
-    least = least_of_all_jumps(instance, 1)
-    for formulation in ("milp-orthogonal", "milp-cycle"):
-        solution = cf.solve(formulate(instance, formulation), "highs")
-        assert solution.objective == pytest.approx(least, abs=1e-6)
-        assert solution.field.energy(1).total == pytest.approx(least, abs=1e-6)
+LIMITED = {"limits": True}
+WAYS = [
+    ("milp-orthogonal", {}, 1, "highs"),
+    ("milp-cycle", {}, 1, "highs"),
+    *(
+        pytest.param(name, options, 2, "gurobi", marks=pytest.mark.needs("gurobi"))
+        for name in ("miqp-orthogonal", "miqp-cycle")
+        for options in ({}, LIMITED)
+    ),
+]
+"""Formulations with options, their norms, and solvers."""
 
 
-@pytest.mark.needs("gurobi")
+@pytest.mark.parametrize("formulation, options, norm, solver", WAYS)
 @pytest.mark.parametrize("name", ["tetrahedron", "tetrahedron without strokes"])
-def test_optima_stay_with_limits_and_are_the_least_of_all_jumps(name):
+def test_optima_are_the_least_of_all_jumps(name, formulation, options, norm, solver):
     instance = INSTANCES[name]()
-    least = least_of_all_jumps(instance, 2)
-    for formulation in ("miqp-orthogonal", "miqp-cycle"):
-        for limits in (False, True):
-            problem = formulate(instance, formulation, limits=limits)
-            solution = cf.solve(problem, "gurobi", limits=cf.Limits(30.0, gap=1e-9))
-            assert solution.field.energy().total == pytest.approx(least, abs=1e-6)
-            assert solution.bound == pytest.approx(least, abs=1e-5)
+    problem = cf.formulate(instance, formulation, **options)
+    solution = cf.solve(problem, solver, limits=cf.Limits(60.0, gap=1e-9))
+    least = least_of_all_jumps(instance, norm)
+    assert solution.objective == pytest.approx(least, abs=1e-6)
+    assert solution.field.energy(norm).total == pytest.approx(least, abs=1e-6)
 
 
-@pytest.mark.needs("gurobi")
-@pytest.mark.slow
-@for_each("name", ["cube", "cube with weights", "sheet", "grid", "grid with holes"])
-def test_the_optimum_is_that_of_the_windows(name):
+def indices_of(field):
+    spots = field.singularities
+    return dict(zip(spots.vertex.tolist(), np.round(4 * spots.index).astype(int).tolist(), strict=True))
+
+
+@pytest.mark.parametrize("name", ["tetrahedron", "sheet"])
+def test_the_best_of_all_indices_of_a_vertex_is_the_optimum(name):
+    """A vertex whose ring is not in the basis by default, where one is left out."""
     instance = INSTANCES[name]()
-    optima = [
-        cf.solve(formulate(instance, formulation, **options), "gurobi", limits=cf.Limits(60.0, gap=1e-9))
-        for formulation, options in (
-            ("miqp-exact", {}),
-            ("miqp-orthogonal", {}),
-            ("miqp-cycle", {}),
-            ("miqp-cycle", {"limits": True}),
-            ("miqp-orthogonal", {"limits": True}),
-        )
-    ]
-    for solution in optima:
-        assert solution.objective == pytest.approx(optima[0].objective, abs=1e-6)
-        assert solution.field.energy().total == pytest.approx(optima[0].objective, abs=1e-6)
+    vertex = int(instance.mesh.ring_vertices[0])
+    free = cf.solve(cf.formulate(instance, "milp-cycle"), "highs", limits=cf.Limits(60.0, gap=1e-9))
+    energies = {}
+    for turns in range(-1, 4):
+        try:
+            problem = cf.formulate(instance, "milp-cycle", indices=[(vertex, turns)])
+        except cf.FormulationError:  # residuals of at most pi/4 do not reach it
+            continue
+        solution = cf.solve(problem, "highs", limits=cf.Limits(60.0, gap=1e-9))
+        assert indices_of(solution.field).get(vertex, 0) == turns
+        energies[turns] = solution.objective
+    assert energies[indices_of(free.field).get(vertex, 0)] == pytest.approx(free.objective, abs=1e-6)
+    assert min(energies.values()) == pytest.approx(free.objective, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_fields_with_given_indices_have_the_energy_of_charges(seed):
+    """On a closed surface of genus 0, residuals are gradients of the potential of the charges, the indices
+    less the curvatures: a Poisson equation on the graph of the vertices, whose edges are the pairs.
+    """
+    corners = icosahedron().vertices + np.random.default_rng(seed).uniform(-0.2, 0.2, (12, 3))
+    mesh = mesh_of(corners, icosahedron().faces)
+    weights = np.random.default_rng(seed).uniform(0.5, 2, len(mesh.first))
+    instance = part(mesh, [], pair_weights=weights)
+    indices = dict.fromkeys(range(12), 0) | indices_of(cf.search(instance, rounds=1).field)
+    edges = np.eye(12)[mesh.pair_vertices[:, 0]] - np.eye(12)[mesh.pair_vertices[:, 1]]
+    charges = np.array(list(indices.values())) - 2 * mesh.defect / np.pi
+    potential = np.linalg.lstsq(edges.T @ (edges / weights[:, None]), charges, rcond=None)[0]
+    problem = cf.formulate(instance, "miqp-cycle", indices=indices.items(), relax=True)
+    solution = cf.solve(problem, "highs")
+    assert solution.objective == pytest.approx(np.pi**2 / 2 * charges @ potential, rel=1e-6)
+    assert {v: q for v, q in indices.items() if q} == indices_of(solution.field)
+
+
+@for_each(
+    "name,indices,message",
+    [
+        ("grid", [(0, 0)], "works on meshes only"),
+        ("sheet", [(0, 0)], "vertex 0 has no index: it is on the boundary"),
+        ("sheet", [(99, 0)], "vertex 99 has no index"),
+        ("sheet", [(4, 0), (4, 1)], "list a vertex twice"),
+        ("sheet", [(4, 0.25)], "no pairs of a vertex and four times its index"),
+        ("sheet", [4, 5], "no pairs of a vertex"),
+        (
+            "sheet",
+            [(4, 3)],
+            "vertex 4 cannot have the index 3/4: with residuals of at most pi/4 it is -2/4 to 2",
+        ),
+        ("cube", [(vertex, 1 + (vertex == 3)) for vertex in range(8)], "add up to 9/4 instead of 8/4"),
+    ],
+)
+def test_indices_that_no_field_has_are_refused(name, indices, message):
+    for formulation in ("miqp-cycle", "milp-cycle"):
+        with pytest.raises(cf.CrossfieldError, match=message):
+            cf.formulate(INSTANCES[name](), formulation, indices=indices)
+    with pytest.raises(cf.FormulationError, match="limits hold where every jump may change"):
+        cf.formulate(INSTANCES["sheet"](), "miqp-cycle", indices=[(4, 0)], limits=True)
+    with pytest.raises(cf.FormulationError, match="has no option indices"):
+        cf.formulate(INSTANCES["sheet"](), "miqp-orthogonal", indices=[(4, 0)])
 
 
 @for_each("name", INSTANCES)
@@ -202,7 +232,7 @@ def optimum_in_windows(instance):
 
 @for_each("seed", range(12))
 def test_limits_of_skewed_crosses_hold_in_the_optimum(seed):
-    """2 pi |A| <= pi^2/2 (1 - r) + 8 (-1)^p beta_i beta_j, and |A| <= pi/2 (1 - r): docs/cycles.md."""
+    """2 pi |A| <= pi^2/2 (1 - r) + 8 (-1)^p beta_i beta_j, |A| <= pi/2 (1 - r) (docs/mathematics.md, 14)."""
     instance = random_instance(seed, [(2, 2), (1, 4), (2, 3)][seed % 3], strokes=3)
     instance = replace(instance, stroke_coefficient=[0.1, 1.0, 20.0][seed % 3])
     alpha, beta, p = optimum_in_windows(instance)
@@ -214,119 +244,24 @@ def test_limits_of_skewed_crosses_hold_in_the_optimum(seed):
     assert (a <= 2 * limit + 1e-7).all()
 
 
-# refusals
-
-
-def test_other_instances_are_refused_with_a_remedy(tmp_path):
-    skewed = cf.sample("mouse", 4)
-    for name in ("miqp-orthogonal", "cycle", "cycle1"):
-        with pytest.raises(FormulationError, match="orthogonal crosses only; make the instance with orthogo"):
-            formulate(skewed, name)
-    in_box = replace(skewed, orthogonal=True, gauge="box")
-    assert formulate(in_box, "miqp-orthogonal").n_columns
-    for name, options in (("miqp-cycle", {}), ("milp-cycle", {}), ("miqp-orthogonal", {"limits": True})):
-        with pytest.raises(FormulationError, match="the gauge box does not at strokes; choose the gauge str"):
-            formulate(in_box, name, **options)
-    with pytest.raises(FormulationError, match="milp-cycle has no option limits"):
-        formulate(in_box, "milp-cycle", limits=True)
-    written = [manifest.formulation for manifest in write_all(skewed, tmp_path, formats=["mps"])]
-    assert not {name for name in written if "cycle" in name or "orthogonal" in name}
-    right = replace(skewed, orthogonal=True)
-    manifests = write_all(
-        right, tmp_path / "right", formulations=NAMES, formats=["mps"], options={"limits": True}
-    )
-    limited = {manifest.formulation for manifest in manifests if "limited" in manifest.document}
-    assert limited == {"miqp-orthogonal", "miqp-cycle"}
-    problem = next(manifest for manifest in manifests if manifest.formulation == "miqp-cycle").problem()
-    assert "the optimum stays" in problem.limited
-    relaxed = formulate(right, "miqp-orthogonal", limits=True, relax=True)
+def test_only_formulations_with_limits_are_limited(tmp_path):
+    right = replace(cf.sample("mouse", 4), orthogonal=True)
+    names = ("miqp-orthogonal", "milp-orthogonal", "miqp-cycle", "milp-cycle")
+    more = {"formulations": names, "formats": ["mps"], "options": LIMITED}
+    manifests = cf.write_all(right, tmp_path, **more)
+    problems = [manifest.problem() for manifest in manifests if "limited" in manifest.document]
+    assert [problem.name for problem in problems] == ["miqp-orthogonal", "miqp-cycle"]
+    assert all("the optimum stays" in problem.limited for problem in problems)
+    relaxed = cf.formulate(right, "miqp-orthogonal", relax=True, **LIMITED)
     assert relaxed.limited.endswith("the relaxation may rise")
 
 
-def test_an_export_names_what_it_leaves_out(tmp_path, capsys):
-    assert invoke(["export", "mouse", "--size", "4", "--format", "mps", "-o", str(tmp_path)]) == 0
-    lines = capsys.readouterr().out.replace("\n", " ")
-    assert "not written: miqp-orthogonal, milp-orthogonal, miqp-cycle, milp-cycle, which is for ort" in lines
-
-
-# files
-
-
-TETRAHEDRON = """Minimize
- obj_sha256_STAMP: + 0 ONE_STAMP
- + 0 d_00
- + 0 d_01
- + 0 d_02
- + 0 d_03
- + 0 d_04
- + 0 d_05
- + 0 q_00
- + 0 q_02
- + 0 k_00
- + 0 k_01
- + 0 k_02
- + 0 k_03
- + [
- + 4 d_00 ^2
- + 4 d_01 ^2
- + 4 d_02 ^2
- + 4 d_03 ^2
- + 4 d_04 ^2
- + 4 d_05 ^2
- + 40 q_00 ^2
- + 40 q_02 ^2
- ] / 2
-Subject To
- cyc3_00: - 1 d_04 - 1 d_03 + 1 d_02 - 1.5707963267948966 k_00 = 3.141592653591
- cyc3_01: + 1 d_00 - 1 d_05 + 1 d_04 - 1.5707963267948966 k_01 = -3.141592653589586
- cyc3_02: + 1 d_01 + 1 d_03 + 1 d_05 - 1.5707963267948966 k_02 = 3.141592653589586
- path1_03: + 1 d_02 - 1 q_02 + 1 q_00 - 1.5707963267948966 k_03 = 1.347197551197
-Bounds
- 1 <= ONE_STAMP <= 1
-LIMITS -3 <= k_00 <= -1
- 1 <= k_01 <= 3
- -3 <= k_02 <= -1
- -2 <= k_03 <= 0
-Generals
- k_00
- k_01
- k_02
- k_03
-End
-"""
-"""Three of four rings, whose kappa are 60, -60 and 180 degrees, and a path of one step between two strokes.
-
-Strokes are at 0.3 and 0.6; from face 2 to face 0 a direction turns by 60 degrees, so 0.6 - 0.3 + pi/3 remain.
-"""
-LIMITS = "".join(
-    f" -0.7853981633974483 <= {name} <= 0.7853981633974483\n"
-    for name in ("d_00", "d_01", "d_02", "d_03", "d_04", "d_05", "q_00", "q_02")
-)
-
-
-def test_the_file_of_a_tetrahedron_is_as_by_hand(tmp_path):
-    problem = formulate(INSTANCES["tetrahedron"](), "miqp-cycle")
-    write(problem, tmp_path / "it.lp")
-    lines = (tmp_path / "it.lp").read_text().splitlines(keepends=True)
-    text = "".join(line for line in lines if not line.startswith("\\"))
-    expected = TETRAHEDRON.replace("STAMP", problem.stamp.removeprefix("sha256_")).replace("LIMITS", LIMITS)
-    assert text == expected
+# rows and files
 
 
 @pytest.mark.parametrize("suffix", ["lp", "mps"])
 def test_highs_reads_rows_of_many_steps(suffix, tmp_path):
-    problem = formulate(part(torus(40, 3), []), "milp-cycle")
+    problem = cf.formulate(part(torus(40, 3), []), "milp-cycle")
     assert max(family.family.steps for family in problem.rows) == 80
-    write(problem, tmp_path / f"it.{suffix}")
-    points = np.random.default_rng(0).normal(size=(2, problem.n_columns))
-    assert algebra_difference(highs.read(tmp_path / f"it.{suffix}"), problem, 0.0, points) == ""
-
-
-@pytest.mark.oracles
-@pytest.mark.slow
-@pytest.mark.parametrize("name", ["cube with weights", "torus with strokes", "sheet with hole", "grid"])
-def test_every_program_reads_every_format(name, tmp_path):
-    formats = ["lp", "mps", "nl", "mod", "osil", "qplib", "bar", "gms"]
-    write_all(INSTANCES[name](), tmp_path, formulations=NAMES, formats=formats, options={"limits": True})
-    checks = verify(tmp_path).checks
-    assert {check.verdict for check in checks} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
+    cf.write(problem, tmp_path / f"it.{suffix}")
+    assert algebra_difference(highs.read(tmp_path / f"it.{suffix}"), problem) == ""

@@ -1,46 +1,24 @@
-"""The mathematics of the formulations: the paper's formulas, their equivalence,
-and optima that are known by hand.
-"""
+"""Formulations against the paper's formulas and by hand: products, facets, classes, jumps, options, names."""
 
 from __future__ import annotations
 
-from dataclasses import replace
 from itertools import product
 
+import crossfield as cf
 import numpy as np
 import pytest
 import sympy as sp
-from cases import MASKS, RIGHT, make_field, make_instance
-from crossfield.export.solving.local import solve
-from crossfield.models.errors import FormulationError
-from crossfield.models.field.field import CrossField
+from cases import MASKS, RIGHT, make_field, make_instance, make_problem
+from crossfield.export.cli.app import invoke
 from crossfield.models.formulations import symbols as n
-from crossfield.models.formulations.catalogue import CUBIC, PARITY, QUARTIC, declare
+from crossfield.models.formulations.catalogue import CUBIC, PARITY, QUARTIC
+from crossfield.models.formulations.choice import declare
+from crossfield.models.formulations.expressions import PI, Symbol, cos, floor, parity
 from crossfield.models.formulations.latex import to_sympy
-from crossfield.models.formulations.problem import formulate, with_integers_fixed
+from crossfield.models.formulations.lifting import lift_products
+from crossfield.models.formulations.symbols import VARIABLES
 from crossfield.models.instance.angles import HALF, QUARTER
-from crossfield.models.instance.instance import Instance
-from crossfield.models.instance.symmetries import mirrored, transposed, turned
-from crossfield.models.processes.limits import Limits
-from exhaustive import random_instance
 from loops import for_each
-
-pytestmark = pytest.mark.numeric
-
-SQUARES = ["minlp-parity", "minlp-quartic", "minlp-cubic", "miqp-exact", "qp-fixed"]
-MIXED = ["miqcp-bilinear", "miqp-mccormick"]
-ABSOLUTE = ["miqcp-bilinear-l1", "milp-mccormick"]
-GAUGES = ["strokes", "box"]
-
-
-def objective_at(name, field, **options):
-    problem = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None, **options)
-    point = problem.point(field)
-    assert problem.violation(point).worst < 1e-12
-    return problem.objective_value(point)
-
-
-# formulas
 
 
 def test_9_is_8_expanded_for_a_binary_p1():
@@ -53,20 +31,21 @@ def test_9_is_8_expanded_for_a_binary_p1():
     on_grid = {n.kappa: 0, n.omega: 1}
     quartic, cubic = (to_sympy(declared.substitute(on_grid)) for declared in (QUARTIC, CUBIC))
     assert sp.expand(cubic - printed) == 0
-    for parity in (0, 1):
-        assert sp.expand((quartic - printed).subs(p1, parity)) == 0
+    for bit in (0, 1):
+        assert sp.expand((quartic - printed).subs(p1, bit)) == 0
     assert sp.expand(quartic - printed) != 0  # it takes the binary
-    assert sp.Poly(quartic, x, p1).total_degree() == 4
-    assert sp.Poly(cubic, a, b, x, y, p1, p2).total_degree() == 3
 
 
-def test_parity_is_8_for_whole_jumps():
-    half = sp.Symbol("half", integer=True)
-    p, p2 = to_sympy(n.p), to_sympy(n.p2)
-    for parity in (0, 1):
-        whole = to_sympy(PARITY).subs(p, 2 * half + parity)
-        split = to_sympy(QUARTIC.substitute({n.p1: parity})).subs(p2, half)
-        assert sp.expand(sp.simplify(whole) - split) == 0
+def test_values_of_expressions_are_those_of_sympy():
+    x, y, w = Symbol("x"), Symbol("y"), Symbol("w")
+    mixed = floor(x / 2) + parity(y) * cos(PI * x) - PI / 4 * w * (2 * x + y) ** 2 + (x - x) * y
+    lifted = [family.body for family in lift_products(declare("minlp-quartic")).objective]
+    bounds = [end for variable in VARIABLES.values() for end in (variable.lower, variable.upper) if end]
+    for declared in [mixed, PARITY, QUARTIC, CUBIC, *lifted, *(1 * end for end in bounds)]:
+        symbols = sorted(declared.symbols, key=str)
+        values = dict(zip(symbols, np.random.default_rng(1).integers(-5, 6, (len(symbols), 7)), strict=True))
+        same = sp.lambdify([to_sympy(symbol) for symbol in symbols], to_sympy(declared), modules="numpy")
+        assert declared.evaluate(values) == pytest.approx(same(*values.values()), rel=1e-12)
 
 
 def test_hull_facets_force_the_product_and_the_printed_one_does_not():
@@ -75,11 +54,11 @@ def test_hull_facets_force_the_product_and_the_printed_one_does_not():
     """
     for facet in ("hull", "printed"):
         rows = [
-            f
-            for f in declare("milp-mccormick", facet=facet).rows
-            if n.z in f.symbols and n.t not in f.symbols
+            family
+            for family in declare("milp-mccormick", facet=facet).rows
+            if n.z in family.symbols and n.t not in family.symbols
         ]
-        for p1, beta in product((0, 1), np.linspace(-QUARTER, QUARTER, 7)):
+        for p1, beta in product((0, 1), np.linspace(-QUARTER, QUARTER, 5)):
             low, high = -QUARTER, QUARTER  # the bounds of z
             for family in rows:
                 given = to_sympy(family.body.substitute({n.p1: p1})).subs(to_sympy(n.beta_i), beta)
@@ -88,8 +67,7 @@ def test_hull_facets_force_the_product_and_the_printed_one_does_not():
             if facet == "hull" or p1 == 1:
                 assert (low, high) == pytest.approx((p1 * beta, p1 * beta), abs=1e-15)
             else:
-                assert low == pytest.approx(max(beta, 0) - QUARTER, abs=1e-15)
-                assert high == pytest.approx(0, abs=1e-15)
+                assert (low, high) == pytest.approx((max(beta, 0) - QUARTER, 0), abs=1e-15)
 
 
 CLASSES = {
@@ -112,142 +90,119 @@ CLASSES = {
 
 @for_each("name, expected", CLASSES.items())
 def test_every_formulation_has_its_class(name, expected):
-    field = make_field(make_instance(orthogonal=name in RIGHT))
-    problem = formulate(field.instance, name, p=field.p if name == "qp-fixed" else None)
-    assert (
-        problem.problem_class,
-        problem.is_convex,
-        problem.objective_degree,
-        problem.row_degree,
-    ) == expected
+    problem = make_problem(name, make_instance(orthogonal=name in RIGHT))
+    facts = problem.problem_class, problem.is_convex, problem.objective_degree, problem.row_degree
+    assert facts == expected
     if name != "qp-fixed":
-        relaxed = formulate(field.instance, name, relax=True)
-        assert relaxed.problem_class == expected[0].removeprefix("MI").replace("NLP", "NLP")
-        assert not relaxed.integer.any()
-        pinned = with_integers_fixed(problem, field)
-        assert not pinned.integer.any()
-        assert pinned.problem_class == relaxed.problem_class
+        relaxed = cf.formulate(problem.instance, name, relax=True)
+        assert relaxed.problem_class == expected[0].removeprefix("MI")
+        fixed = problem.with_integers_fixed(make_field(problem.instance))
+        assert fixed.problem_class == relaxed.problem_class
 
 
-# values
-
-
-@for_each("gauge", GAUGES)
+@for_each("gauge", ["strokes", "box"])
 @for_each("shape", MASKS)
-def test_objectives_are_the_energies_of_the_field(shape, gauge):
-    for seed in range(4):
-        field = make_field(make_instance(shape, gauge, seed), seed)
-        squares, absolute = field.energy(2), field.energy(1)
-        for name in SQUARES:
-            assert objective_at(name, field) == pytest.approx(squares.total, rel=1e-9)
-        for name in MIXED:
-            mixed = absolute.smooth + squares.strokes + squares.beta
-            assert objective_at(name, field) == pytest.approx(mixed, rel=1e-9)
-            assert objective_at(name, field, stroke_norm=1) == pytest.approx(
-                mixed - squares.strokes + absolute.strokes, rel=1e-9
-            )
-            assert objective_at(name, field, beta_norm=1) == pytest.approx(
-                mixed - squares.beta + absolute.beta, rel=1e-9
-            )
-        for name in ABSOLUTE:
-            assert objective_at(name, field) == pytest.approx(absolute.total, rel=1e-9)
-            assert objective_at(name, field, relax=True) == pytest.approx(absolute.total, rel=1e-9)
-        assert objective_at("milp-mccormick", field, facet="printed") == pytest.approx(
-            absolute.total, rel=1e-9
-        )
+def test_p1_and_p2_reach_every_useful_jump_and_no_other(shape, gauge):
+    problem = make_problem("minlp-cubic", make_instance(shape, gauge))
+    instance = problem.instance
+    p1, p2 = problem.blocks["p1"], problem.blocks["p2"]
+    reached = [set() for _ in instance.grid.first]
+    for first, second in product((0, 1), range(-4, 5)):
+        point = np.zeros(problem.n_columns)
+        point[p1.slice], point[p2.slice] = first, second
+        allowed = (p1.lower <= first) & (first <= p1.upper) & (p2.lower <= second) & (second <= p2.upper)
+        for family in problem.rows:
+            excess = family.values(point)
+            allowed[family.elements[excess < 0 if family.family.sense == ">=" else excess > 0]] = False
+        for pair in np.nonzero(allowed)[0]:
+            reached[pair].add(first + 2 * second)
+    expected = [set(range(low, high + 1)) for low, high in zip(instance.p_min, instance.p_max, strict=True)]
+    assert reached == expected
+    parity_block = make_problem("minlp-parity", instance).blocks["p"]
+    assert parity_block.lower.tolist() == instance.p_min.tolist()
+    assert parity_block.upper.tolist() == instance.p_max.tolist()
 
 
-def test_two_labels_of_one_cross_cost_nothing_at_the_jump_one():
-    """(0, b) and (pi/2, -b) are two labels of one cross: p = +1 takes the first to the second."""
-    instance = Instance.on_pixels(
-        "two", np.ones((1, 2), bool), np.array([[0, 0]]), np.array([0.3]), np.ones(1)
+@for_each(
+    "name, block, change, kind, amount, family",
+    [
+        ("milp-mccormick", "gamma", -0.25, "rows", 0.25, ("c22", "c23")),
+        ("milp-mccormick", "beta", -2.0, "bounds", None, ()),
+        ("milp-mccormick", "p2", 0.0625, "integrality", 0.0625, ()),
+        ("miqp-exact", "d", 0.5, "rows", 0.5, ("cd",)),
+    ],
+)
+def test_violations_are_found(name, block, change, kind, amount, family):
+    field = make_field(make_instance("full"))
+    problem = cf.formulate(field.instance, name)
+    point = problem.point(field)
+    point[problem.blocks[block].offset] += change
+    violation = problem.violation(point)
+    expected = 2.0 - field.beta[0] - QUARTER if amount is None else amount
+    assert getattr(violation, kind) == pytest.approx(expected)
+    assert violation.worst >= getattr(violation, kind)
+    assert not family or violation.worst_family in family
+
+
+def test_noise_is_left_out_and_small_weights_are_not():
+    """Jumps that cancel leave no cost of 1e-16; the format decides on a weight of 1e-13."""
+    instance = cf.Instance.on_pixels(
+        "line", np.ones((1, 3), bool), [[0, 0]], [1e-16], [1.0], skew_coefficient=1e-13
     )
-    assert (instance.grid.first.tolist(), instance.grid.second.tolist()) == ([0], [1])
-    field = CrossField(instance, np.array([0, HALF]), np.array([0.3, -0.3]), np.array([1]))
-    other = replace(field, p=np.array([0]))
-    for name in (*SQUARES, *MIXED, *ABSOLUTE):
-        norm = 1 if name in ABSOLUTE else 2
-        assert objective_at(name, field) == pytest.approx(field.energy(norm).beta, rel=1e-12)
-        smooth = 2 * (HALF**2 + 0.6**2) if name in SQUARES else 2 * (HALF + 0.6)
-        assert objective_at(name, other) == pytest.approx(smooth + field.energy(norm).beta, rel=1e-12)
+    costs = cf.formulate(instance, "qp-fixed", p=[1, 1]).to_arrays().c
+    assert costs[1] == 0  # - pi + pi
+    assert np.abs(costs[costs != 0]).min() == pytest.approx(2 * HALF * 2)
+    costs = cf.formulate(instance, "milp-mccormick").to_arrays().c
+    assert (costs == 1e-13).sum() == 3
+    assert costs[costs != 0].min() == 1e-13
 
 
-# optima
+def test_arrays_do_not_share_memory_with_the_problem():
+    problem = make_problem("milp-mccormick", make_instance("full"))
+    problem.to_arrays().lower[:] = 7
+    assert not (problem.lower == 7).any()
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("degrees", [(20, 20), (0, 90), (100, 100), (30, 120), (10, 70), (170, 50)])
-def test_parallel_strokes_and_two_families_cost_nothing(degrees):
-    """Strokes of one direction, or of two at any angle, are met by one constant cross;
-    the hint of skew costs skew_coefficient.
-    """
-    pixels = np.array([[0, 0], [0, 2], [2, 0], [2, 2]])
-    theta = np.radians(np.array([degrees[0], degrees[1], degrees[1], degrees[0]]))
-    instance = Instance.on_pixels("lines", np.ones((3, 3), bool), pixels, theta, np.ones(4))
-    solution = solve(formulate(instance, "milp-mccormick"), "highs", limits=Limits(250))
-    assert solution.status == "optimal-global"
-    assert solution.objective < 9 * 1e-6 * QUARTER + 1e-9
-    assert solution.field.energy(1).total == pytest.approx(solution.objective, abs=1e-7)
-
-
-def optimum(instance, name="milp-mccormick", **options):
-    solution = solve(formulate(instance, name, **options), "highs", limits=Limits(250, gap=0))
-    assert solution.status == "optimal-global"
-    return solution.objective
-
-
-@pytest.mark.parametrize("seed", [4, 6])
-@pytest.mark.slow
-def test_optimum_does_not_depend_on_the_axes(seed):
-    instance = random_instance(seed, (3, 3), 3)
-    best = optimum(instance)
-    assert best > 1e-3
-    for moved in (turned(instance), mirrored(instance), transposed(instance)):
-        assert optimum(moved) == pytest.approx(best, rel=1e-6, abs=1e-7)
-    assert optimum(instance.with_gauge("box")) >= best - 1e-7
-
-
-def test_the_box_forces_skew_and_depends_on_the_axes():
-    """Strokes at 120 degrees everywhere: free of cost, unless the box holds alpha below 90 degrees."""
-    pixels = np.argwhere(np.ones((2, 2)))
-    instance = Instance.on_pixels(
-        "steep", np.ones((2, 2), bool), pixels, np.full(4, np.radians(120)), np.ones(4), skew_coefficient=1e-2
+@for_each(
+    "name, options, message",
+    [
+        ("milo", {}, "no formulation 'milo' .*; choose one of minlp-parity"),
+        ("MILP", {}, r"no formulation 'MILP' .*\(is it milp\?\)"),
+        ("quartc", {}, r"\(is it quartic\?\)"),
+        ("zzz", {}, "in short parity, quartic, cubic, bilin, bilin1, miqp, milp"),
+        ("milp-mccormick", {"norm": 1}, "no option 'norm'"),
+        ("minlp-cubic", {"facet": "printed"}, "minlp-cubic has no option facet"),
+        ("qp-fixed", {"relax": True}, "qp-fixed has no option relax"),
+        ("milp-mccormick", {"facet": "round"}, "no facet 'round'"),
+        ("milp-mccormick", {"p": [0, 0, 0]}, "milp-mccormick has the jumps as variables; leave p out"),
+        ("qp-fixed", {}, "qp-fixed takes the jumps of all pairs as data; give p=field.p"),
+        ("qp-fixed", {"p": [0]}, r"p has shape \(1,\), but the grid has 2 pairs"),
+        ("milp-cycle", {}, "orthogonal crosses only; make the instance with orthogonal"),
+        ("milp-cycle orthogonal", {"limits": True}, "milp-cycle has no option limits"),
+        ("miqp-cycle orthogonal box", {}, "the gauge box does not at strokes; choose the gauge strokes"),
+        ("miqp-orthogonal orthogonal box", {"limits": True}, "the gauge box does not at strokes; choose"),
+    ],
+)
+def test_names_and_options_that_do_not_fit_are_refused(name, options, message):
+    name, *words = name.split()
+    instance = cf.Instance.on_pixels(
+        "row", [[True] * 3], [[0, 0]], [0.3], [1.0], orthogonal="orthogonal" in words
     )
-    assert optimum(instance) == pytest.approx(0, abs=1e-9)
-    boxed = instance.with_gauge("box")
-    assert optimum(boxed) == pytest.approx(4 * 1e-2 * np.radians(30), rel=1e-6)
-    assert optimum(turned(boxed)) == pytest.approx(0, abs=1e-9)
+    with pytest.raises(cf.FormulationError, match=message):
+        cf.formulate(instance.with_gauge("box") if "box" in words else instance, name, **options)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("gauge", GAUGES)
-def test_the_printed_facet_is_a_weaker_relaxation(gauge):
-    gaps = [
-        optimum(random_instance(seed, (3, 3), 3, gauge))
-        - optimum(random_instance(seed, (3, 3), 3, gauge), facet="printed")
-        for seed in (4, 5, 6, 7)
-    ]
-    assert min(gaps) >= -1e-7
-    assert gauge == "box" or max(gaps) > 1e-3
+def test_cosines_are_not_lifted():
+    with pytest.raises(cf.FormulationError, match=r"minlp-parity has cosines.*; choose minlp-quartic"):
+        _ = cf.formulate(cf.sample("mouse", 4), "minlp-parity").lifted
 
 
-# declarations
+def test_a_formulation_in_the_place_of_a_method_is_named(tmp_path, capfd):
+    assert invoke(["solve", "mouse", "--size", "4", "-m", "milp", "-o", str(tmp_path)]) == 2
+    assert "milp is a formulation, not a method; write -f milp" in " ".join(capfd.readouterr().err.split())
 
 
-def test_options_that_a_formulation_lacks_are_refused():
-    with pytest.raises(FormulationError, match=r"no formulation 'milo' .*; choose one of minlp-parity"):
-        declare("milo")
-    with pytest.raises(FormulationError, match="no option 'norm'"):
-        declare("milp-mccormick", norm=1)
-    with pytest.raises(FormulationError, match="minlp-cubic has no option facet"):
-        declare("minlp-cubic", facet="printed")
-    with pytest.raises(FormulationError, match="qp-fixed has no option relax"):
-        declare("qp-fixed", relax=True)
-    with pytest.raises(FormulationError, match="miqp-exact has no option facet"):
-        declare("miqp-exact", facet="printed")
-    with pytest.raises(FormulationError, match="no facet 'round'"):
-        declare("milp-mccormick", facet="round")
-    with pytest.raises(FormulationError, match="1 or 2"):
-        declare("milp-mccormick", stroke_norm=3)
-    assert declare("milp-mccormick", facet=None, relax=None) == declare("milp-mccormick")
-    assert declare("minlp-cubic", facet="hull") == declare("minlp-cubic")
+def test_an_export_names_what_it_leaves_out(tmp_path, capsys):
+    assert invoke(["export", "mouse", "--size", "4", "--format", "mps", "-o", str(tmp_path)]) == 0
+    lines = capsys.readouterr().out.replace("\n", " ")
+    assert "not written: miqp-orthogonal, milp-orthogonal, miqp-cycle, milp-cycle, which is for ort" in lines

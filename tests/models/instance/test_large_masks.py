@@ -1,5 +1,6 @@
 """Memory follows the pixels, not the sides of the mask."""
 
+import pytest
 from children import require_proc, within_memory
 
 TWO_PIXELS = """
@@ -19,6 +20,7 @@ print(open("/proc/self/status").read().split("VmHWM:")[1].split()[0])  # getrusa
 """
 
 
+@pytest.mark.slow
 def test_two_pixels_on_the_largest_grid_take_the_memory_of_two_pixels(tmp_path):
     """A mask of 100 MB is read in the two gigabytes, and copied a few times."""
     require_proc()

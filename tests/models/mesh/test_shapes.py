@@ -1,5 +1,8 @@
-"""The built-in meshes are oriented manifolds of the shapes that their names say."""
+"""The built-in meshes are oriented manifolds of the shapes that their names say, and hold indices so."""
 
+from dataclasses import replace
+
+import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.mesh.shapes import MESHES
@@ -28,15 +31,23 @@ def test_flat_sheets_face_upwards(name):
     assert (MESHES[name][1]().normals[:, 2] > 0).all()
 
 
-@pytest.mark.parametrize("name", sorted(set(MESHES) - {*FLAT, "bump", "half_torus", "three_parts"}))
+CLOSED = sorted(set(MESHES) - {*FLAT, "bump", "half_torus", "three_parts"})
+
+
+@pytest.mark.parametrize("name", CLOSED)
 def test_closed_bodies_have_their_normals_outside(name):
     mesh = MESHES[name][1]()
     first, second, third = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
     assert (first * np.cross(second, third)).sum() / 6 > 0  # the volume
 
 
-def test_rings_close_round_every_inner_vertex():
-    for name in ("cube", "plate", "doughnut"):
-        mesh = MESHES[name][1]()
-        turn = mesh.defect[mesh.ring_vertices] - mesh.rings.sums(mesh.kappa)
-        np.testing.assert_allclose(turn, 2 * np.pi * np.round(turn / (2 * np.pi)), atol=1e-9)
+@pytest.mark.parametrize("name", CLOSED)
+def test_indices_add_up_to_the_euler_characteristic(name):
+    """For any angles and jumps, best ones and others."""
+    instance = cf.sample(name)
+    rng = np.random.default_rng(1)
+    u = rng.uniform(0, np.pi, instance.mesh.size)
+    best = cf.CrossField.from_lines(instance, u, u + np.pi / 2)
+    index = replace(best, p=best.p + rng.integers(-1, 2, len(best.p))).singularities.index
+    assert index.sum() == instance.mesh.euler_characteristic
+    assert (4 * index == np.round(4 * index)).all()

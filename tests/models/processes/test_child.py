@@ -52,28 +52,12 @@ def test_work_that_does_not_stop_is_killed(child, tmp_path):
     assert child.call(abs, -3).value == 3
 
 
-def test_without_time_nothing_is_started(child):
-    before = descendants(os.getpid())
-    with pytest.raises(KilledError, match="no time was left"):
-        child.call(abs, -3, deadline=Deadline.after(-1.0))
-    assert descendants(os.getpid()) == before
-
-
-def test_a_deadline_arrives_with_what_is_left_when_the_process_is_ready(child):
-    assert 90 < child.call(work.left, Deadline.after(100.0)).value <= 100.0
-
-
 def test_what_work_prints_goes_to_its_log(child, tmp_path):
     log = tmp_path / "log"
     child.call(work.prints, log=log)
     assert sorted(log.read_text().splitlines()) == ["an error", "from C", "from Python"]
     assert child.call(abs, -1, log=tmp_path / "other").value == 1
     assert (tmp_path / "other").read_text() == ""
-
-
-def test_a_child_works_in_its_folder(tmp_path):
-    with Child(tmp_path) as child:
-        assert Path(child.call(work.where).value).samefile(tmp_path)
 
 
 def test_failures_are_named(child):

@@ -39,16 +39,8 @@ def call(tmp_path):
         (modules / "later.py").write_text(LATER.format(name=name))
         (modules / "earlier.py").write_text(EARLIER.format(factor=factor))
         settings = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"}
-        settings |= variables or {"XDG_CACHE_HOME": str(tmp_path / "cache")}
-        code = CALL.format(name=name)
-        run = subprocess.run(
-            [sys.executable, "-c", code],
-            cwd=modules,
-            env=settings,
-            capture_output=True,
-            text=True,
-            check=False,
-        )
+        command, settings = [sys.executable, "-c", CALL.format(name=name)], settings | variables
+        run = subprocess.run(command, cwd=modules, env=settings, capture_output=True, text=True, check=False)
         assert run.returncode == 0, run.stderr
         assert not [*modules.rglob("*.nb?")]
         return run.stdout.split()
@@ -56,19 +48,23 @@ def call(tmp_path):
     return run
 
 
-@pytest.mark.parametrize("variable", ["XDG_CACHE_HOME", "NUMBA_CACHE_DIR"])
-def test_code_is_cached_in_the_folder_of_the_user(call, tmp_path, variable):
-    folder = {variable: str(tmp_path / "mine")}
+@pytest.mark.slow
+def test_code_is_cached_for_the_user_and_compiled_again_in_another_version(call, tmp_path):
+    folder = {"XDG_CACHE_HOME": str(tmp_path / "mine")}
     assert call(**folder) == ["False", "4.0", "True"]
     assert call(**folder) == ["True", "4.0", "True"]
     assert len([*(tmp_path / "mine").rglob("*.nbi")]) == 2
+    assert call(name="Weights", **folder) == ["False", "4.0", "True"]
+    assert call(factor=3.0, **folder) == [
+        "False",
+        "6.0",
+        "True",
+    ]  # Numba compares the file of the caller only
 
 
-def test_code_of_another_version_is_compiled_again(call):
-    assert call() == ["False", "4.0", "True"]
-    assert call(name="Weights") == ["False", "4.0", "True"]
-    assert call(factor=3.0) == ["False", "6.0", "True"]  # Numba compares the file of the caller only
-    assert call() == ["True", "4.0", "True"]
+def test_the_folder_of_numba_is_taken(call, tmp_path):
+    assert call(NUMBA_CACHE_DIR=str(tmp_path / "mine")) == ["False", "4.0", "True"]
+    assert len([*(tmp_path / "mine").rglob("*.nbi")]) == 2
 
 
 def test_functions_work_where_no_folder_is_writable(call, tmp_path):

@@ -2,11 +2,8 @@
 
 import math
 import pickle
-import threading
 
-import pytest
-from crossfield.models.errors import InputError
-from crossfield.models.processes.deadline import Deadline, stop_function
+from crossfield.models.processes.deadline import Deadline
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -21,16 +18,6 @@ class Clock:
 
     def __call__(self):
         return self.now
-
-
-def test_a_deadline_tells_what_is_left_and_when_it_has_passed():
-    clock = Clock()
-    deadline = Deadline.after(3.0, clock)
-    assert (deadline.left(), deadline.passed()) == (3.0, False)
-    clock.now += 2.0
-    assert (deadline.left(), deadline.passed()) == (1.0, False)
-    clock.now += 5.0
-    assert (deadline.left(), deadline.passed()) == (0.0, True)
 
 
 @given(SECONDS, st.lists(st.tuples(st.floats(0, 1), st.floats(0, 1), SECONDS, SECONDS)))
@@ -50,15 +37,3 @@ def test_a_deadline_goes_to_another_process():
     for seconds in (5.0, math.inf):
         sent, arrived = Deadline.after(seconds), pickle.loads(pickle.dumps(Deadline.after(seconds)))
         assert sent.at <= arrived.at <= Deadline.after(seconds).at
-
-
-def test_a_request_to_stop_is_a_function_or_an_event():
-    happened = threading.Event()
-    is_over = stop_function(happened)
-    assert not is_over()
-    happened.set()
-    assert is_over()
-    assert stop_function(is_over) is is_over
-    assert not stop_function(None)()
-    with pytest.raises(InputError, match="stop is bool; give a function"):
-        stop_function(True)

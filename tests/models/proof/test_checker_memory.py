@@ -4,12 +4,10 @@ import json
 import subprocess
 import sys
 
+import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.array_archive import pack_arrays
-from crossfield.models.errors import InputError
-from crossfield.models.instance.instance import Instance
-from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.checkers import check_certificate, check_orthogonal
 from exhaustive import optimum, random_instance, sketch
 from orthogonal_certificates import certificate_at
@@ -51,7 +49,7 @@ def arrays(tmp_path_factory):
     folder, by_pair = tmp_path_factory.mktemp("certificates"), {}
     for pair in (False, True):
         instance = random_instance(0, (1, 2), 2) if pair else sketch(np.ones((1, 1), bool), np.ones((1, 1)))
-        write_certificate(prove_round(optimum(instance), levels=1), folder / "it.npz")
+        cf.write_certificate(prove_round(optimum(instance), levels=1), folder / "it.npz")
         by_pair[pair] = check_certificate.read_arrays(str(folder / "it.npz"))
     return by_pair
 
@@ -74,10 +72,8 @@ def test_a_small_file_cannot_ask_for_much_memory(arrays, tmp_path):
     for name, forged in {
         "labels of a pixel": with_labels(arrays[False], 4095, 4095),
         "labels": with_labels(arrays[True], 3000, 2000),
-        "alphas of a pair": with_labels(arrays[True], 4096, 2),
         "pixels": arrays[True] | {"instance_mask": mask},
         "tables": arrays[True] | {"level_0_table_steps": np.zeros(9_000_000, np.int32)},
-        "steps": arrays[True] | {"level_0_share_steps": np.zeros(25_000_000, np.int32)},
     }.items():
         path.write_bytes(pack_arrays(forged))
         size = path.stat().st_size
@@ -85,16 +81,14 @@ def test_a_small_file_cannot_ask_for_much_memory(arrays, tmp_path):
         assert (code, size < 500_000) == (2, True), (name, text)
         assert "a file of its size may" in text, name
         assert memory <= check_certificate.ROOM + check_certificate.MORE_ROOM * size, name
-        with pytest.raises(InputError, match="a file of its size may"):
-            read_certificate(path)
+        with pytest.raises(cf.InputError, match="a file of its size may"):
+            cf.read_certificate(path)
 
 
 def test_a_level_takes_no_more_memory_than_is_allowed(arrays, tmp_path):
     path, most = tmp_path / "it.npz", 1400
     for name, forged in {
         "one pixel": with_labels(arrays[False], most, most // 2),
-        "alphas": with_labels(arrays[True], 800, 160),
-        "betas": with_labels(arrays[True], 160, 700),
         "both": with_labels(arrays[True], 500, 500),
     }.items():
         counts = forged["level_0_ranges"][:, 1::2]
@@ -121,7 +115,7 @@ def test_a_level_that_covers_too_little_is_refused_before_its_pass(arrays, tmp_p
 def orthogonal_pixels(count, divisions):
     """Arrays of a certificate of some pixels in a row, with a level of so many cells and shares of 0."""
     mask, at = np.ones((1, count), bool), np.zeros((1, 2), int)
-    instance = Instance.on_pixels("row", mask, at, np.array([0.3]), np.ones(1), orthogonal=True)
+    instance = cf.Instance.on_pixels("row", mask, at, np.array([0.3]), np.ones(1), orthogonal=True)
     arrays, pairs = certificate_at(instance, np.zeros(count, int), 3), count - 1
     return arrays | {
         "divisions": np.array([divisions], np.int32),
@@ -130,7 +124,7 @@ def orthogonal_pixels(count, divisions):
     }
 
 
-@pytest.mark.parametrize("count, divisions", [(2, 10_000), (2, 3000), (5000, 3), (200_000, 3)])
+@pytest.mark.parametrize("count, divisions", [(2, 10_000), (200_000, 3)])
 def test_a_small_orthogonal_certificate_cannot_ask_for_much_memory(count, divisions, tmp_path):
     path = tmp_path / "it.npz"
     arrays = orthogonal_pixels(2, divisions) if count == 2 else orthogonal_pixels(2, 3)
@@ -141,8 +135,8 @@ def test_a_small_orthogonal_certificate_cannot_ask_for_much_memory(count, divisi
     text, code, memory = checked(path, TWO_GB, "orthogonal")
     assert (code, size < 50_000) == (2, True), text
     assert memory <= check_certificate.memory_for(size, check_orthogonal.MORE_ROOM)
-    with pytest.raises(InputError, match="a file of its size may"):
-        read_certificate(path)
+    with pytest.raises(cf.InputError, match="a file of its size may"):
+        cf.read_certificate(path)
 
 
 def test_many_large_levels_in_a_small_file_are_refused():
@@ -158,7 +152,7 @@ def test_many_large_levels_in_a_small_file_are_refused():
         check_orthogonal.check_arrays(arrays, memory=2 * of_one)
 
 
-@pytest.mark.parametrize("count, divisions", [(2, 1200), (60, 100), (1500, 15)])
+@pytest.mark.parametrize("count, divisions", [(2, 1200), (1500, 15)])
 def test_an_orthogonal_level_takes_no_more_memory_than_is_allowed(count, divisions, tmp_path):
     path = tmp_path / "it.npz"
     arrays = orthogonal_pixels(count, divisions)

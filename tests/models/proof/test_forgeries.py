@@ -8,16 +8,13 @@ import zipfile
 from collections import Counter
 from dataclasses import replace
 
+import crossfield as cf
 import numpy as np
 import pytest
-from allowed_labels import with_allowed
-from archives import forged, members_of, npy, packed
-from crossfield.models.errors import InputError, InstanceError
-from crossfield.models.field.field import CrossField
+from archives import members_of, npy, packed
+from certificate_arrays import claiming, of_instance, with_allowed, with_array, with_entry, with_head
 from crossfield.models.instance.file import instance_of_arrays
-from crossfield.models.proof.certificate import read_certificate, write_certificate
 from crossfield.models.proof.checkers import check_certificate
-from crossfield.models.proof.prove import prove
 from crossfield.models.search.angle_program import alternate_absolute
 from exhaustive import optimum, random_instance
 from proofs_round_fields import prove_round
@@ -25,18 +22,18 @@ from proofs_round_fields import prove_round
 REFUSED = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 KINDS = ("optimal", "a window binds", "a worse field", "tables", "norm 1", "norm mixed")
 COARSE = 2.0**-12
-TRIES = 7
+TRIES = 3
 """Places of every array that are changed, each once up and once down."""
 
 
 def proof_of_kind(kind):
     """A proof of four pixels."""
     if kind.startswith("norm"):
-        return prove(random_instance(2, (2, 2), 4), norm=1 if kind == "norm 1" else "mixed", jobs=1)
+        return cf.prove(random_instance(2, (2, 2), 4), norm=1 if kind == "norm 1" else "mixed", jobs=1)
     seed = {"optimal": 1, "a window binds": 6, "a worse field": 4, "tables": 3}[kind]
     field = optimum(random_instance(seed, (2, 2), 4))
     if kind == "a worse field":
-        field = CrossField(field.instance, field.alpha, field.beta + np.array([0, 0.01, 0, 0]), field.p)
+        field = cf.CrossField(field.instance, field.alpha, field.beta + np.array([0, 0.01, 0, 0]), field.p)
     proof = prove_round(field, levels=3)
     if kind == "tables":
         grid, last = field.instance.grid, f"level_{len(proof.levels) - 1}_"
@@ -57,15 +54,10 @@ def honest(tmp_path):
 
     def of(kind):
         path = tmp_path / "it.npz"
-        write_certificate(proof_of_kind(kind), path)
+        cf.write_certificate(proof_of_kind(kind), path)
         return path
 
     return of
-
-
-def with_head(arrays, name="head", **changes):
-    head = json.loads(arrays[name].tobytes()) | changes
-    return arrays | {name: np.frombuffer(json.dumps(head).encode(), np.uint8)}
 
 
 def modest(name, arrays):
@@ -149,13 +141,13 @@ def test_no_changed_number_makes_a_false_claim_pass(kind, honest):
             head = json.loads(held["head"].tobytes())
             try:
                 least = least_energy(other, known, head["norm"])
-            except InstanceError:
+            except cf.InstanceError:
                 continue  # crossfield does not read such an instance
             assert max(bound, head["bound"]) <= least + 1e-11, name
             assert head["bound"] <= bound + 1.1 * check_certificate.SPARE * (1 + bound), name
             assert head["status"] == "gap" or head["energy"] <= least + 2e-8, name
-    assert counts["refused"] > 100
-    assert counts["confirmed"] > 100
+    assert counts["refused"] > 50
+    assert counts["confirmed"] > 50
 
 
 def other_forms(array):
@@ -181,115 +173,147 @@ def other_forms(array):
     return {name: form for name, form in forms.items() if array.size or name in {"one more", "another type"}}
 
 
-def assert_refused(path):
-    """No reader takes the file for a certificate."""
-    assert check_certificate.main([str(path)]) in {1, 2}
-    with pytest.raises((InputError, InstanceError)):
-        read_certificate(path)
-
-
+@pytest.mark.slow
 def test_every_array_in_another_form_is_refused(honest, tmp_path, subtests):
-    """Arrays of the last level stand for those of all."""
+    """Or if it is left out; arrays of the last level stand for those of all."""
     path, other = honest("tables"), tmp_path / "other.npz"
     members, arrays = members_of(path.read_bytes()), check_certificate.read_arrays(str(path))
     for name, array in arrays.items():
-        for kind, form in other_forms(array).items() if not name.startswith(("level_0", "level_1")) else ():
+        if name.startswith(("level_0", "level_1")):
+            continue
+        for kind, form in {**other_forms(array), "left out": None}.items():
             with subtests.test(name=name, what=kind):
-                changed = members | {f"{name}.npy": npy(form)}
+                changed = {key: data for key, data in members.items() if key != f"{name}.npy"}
+                changed |= {} if form is None else {f"{name}.npy": npy(form)}
                 other.write_bytes(packed([*changed.items()], zipfile.ZIP_STORED))
-                assert_refused(other)
+                with pytest.raises((cf.InputError, cf.InstanceError)):
+                    cf.read_certificate(other)
 
 
-def test_every_array_twice_renamed_or_left_out_is_refused(honest, tmp_path, subtests):
-    data, other = honest("tables").read_bytes(), tmp_path / "other.npz"
-    members = members_of(data)
-    for member in members:
-        files = forged(member.removesuffix(".npy"))
-        left_out = packed([entry for entry in members.items() if entry[0] != member])
-        for forgery in ("a member twice", "a name in other case", "another ending", "left out"):
-            with subtests.test(member=member, what=forgery):
-                other.write_bytes(left_out if forgery == "left out" else files[forgery](data))
-                assert_refused(other)
+def first_level(arrays):
+    """The arrays with the first level alone, whose labels are too coarse for the optimum."""
+    kept = {name: array for name, array in arrays.items() if not re.match("level_[12]_", name)}
+    kept |= {name: kept[name][:0] for name in ("cuts", "multipliers")}
+    return with_head(kept, levels=1, bound=0.0)
 
 
-def with_entry(name, at, value):
-    """A function that returns arrays with one entry of an array changed."""
+def without_a_label(arrays):
+    """The arrays with one label less on the first level, and as many shares."""
+    bits = np.unpackbits(arrays["level_0_allowed"])
+    bits[0] = 0
+    return with_allowed(arrays, 0, bits)
+
+
+def repeated_key(arrays):
+    """The arrays with two bounds in their head."""
+    text = arrays["head"].tobytes().replace(b"{", b'{"bound": 1.0, ', 1)
+    return arrays | {"head": np.frombuffer(text, np.uint8)}
+
+
+def with_cuts(cuts):
+    """A function that returns arrays with other cuts, and as many rows of multipliers."""
 
     def change(arrays):
-        array = arrays[name].copy()
-        array.reshape(-1)[at] = value
-        return arrays | {name: array}
+        rows = np.resize(arrays["multipliers"], (cuts.count(-1), arrays["multipliers"].shape[1]))
+        return arrays | {"cuts": np.array(cuts, "i4"), "multipliers": rows}
 
     return change
 
 
-def of_instance(**changes):
-    """A function that returns arrays with other keys in the head of the instance."""
-    return lambda arrays: with_head(arrays, "instance_head", **changes)
-
-
-BROKEN = {
-    "orthogonal crosses": (of_instance(orthogonal=True), "orthogonal"),
-    "1 for true": (of_instance(orthogonal=1), "orthogonal"),
-    "weights of pairs": (
-        lambda a: a | {"instance_pair_weights": np.ones(4)},
-        "instance_pair_weights too many",
+BROKEN = [
+    # The claim
+    ("is no crossfield-certificate of version 4", claiming(version=3)),
+    ("is no crossfield-certificate of version 4", claiming(version=5)),
+    ("is no crossfield-certificate of version 4", claiming(version="4")),
+    ("is no crossfield-certificate of version 4", claiming(version=4.0)),
+    ("is no crossfield-certificate of version 4", claiming(version=True)),
+    ("a repeated key", repeated_key),
+    ("energy is claimed", claiming(energy=0.01)),
+    ("energy is not in", claiming(energy=np.inf)),
+    ("bound is claimed", claiming(bound=1.0)),
+    ("bound is not in", claiming(bound=-np.inf)),
+    ("bound is not in", claiming(bound=np.nan)),
+    ("status is neither", claiming(status="best")),
+    ("status is claimed as optimal", first_level),
+    ("levels is not in", claiming(levels=0)),
+    ("levels is no whole number", claiming(levels=2.5)),
+    ("too many for a certificate with 1 levels", claiming(levels=1, status="gap", bound=0.0)),
+    # The instance and the field
+    ("orthogonal", of_instance(orthogonal=True)),
+    ("orthogonal", of_instance(orthogonal=1)),
+    ("gauge", of_instance(gauge="none")),
+    ("w_beta", of_instance(w_beta=-1e-9)),
+    ("w_beta", of_instance(w_beta=np.nan)),
+    ("w_strokes", of_instance(w_strokes=np.inf)),
+    ("w_strokes", of_instance(w_strokes=True)),
+    ("instance_pair_weights too many", with_array("instance_pair_weights", [1] * 4, "f8")),
+    ("instance_crossings", with_array("instance_crossings", [0])),
+    ("theta", with_entry("instance_theta", 0, np.pi)),
+    ("instance_w[0] is not in", with_entry("instance_w", 0, 0.0)),
+    ("instance_w[0] is not in", with_entry("instance_w", 0, 1.5)),
+    ("strokes", with_entry("instance_stroke_pixels", [2, 3], [0, 0])),
+    ("stroke_pixels", with_entry("instance_stroke_pixels", 0, -1)),
+    ("alpha[0] is outside", with_entry("alpha", 0, 4.0)),
+    ("beta[3] is beyond", with_entry("beta", 3, -0.8)),
+    ("p[0]", with_entry("p", 0, 65)),
+    ("p[0]", with_entry("p", 0, -(2**31))),
+    # The levels
+    ("has no array level_1_h", lambda arrays: {name: arrays[name] for name in arrays if name != "level_1_h"}),
+    ("centre_alpha", with_entry("centre_alpha", 0, -16.1)),
+    ("centre_beta", with_entry("centre_beta", 0, 16.1)),
+    ("level_0_h holds something", with_entry("level_0_h", 0, np.nan)),
+    ("level_0_h", with_entry("level_0_h", 0, 0.0)),
+    ("level_0_h", with_entry("level_0_h", 0, -0.1)),
+    ("level_0_h", with_entry("level_0_h", 0, 0.8)),
+    ("level_1_h", lambda arrays: arrays | {"level_1_h": arrays["level_0_h"] / 3}),
+    ("level_0_ranges", with_entry("level_0_ranges", 1, 1)),
+    ("level_0_ranges", with_entry("level_0_ranges", 1, -9)),
+    ("level_0_ranges", with_entry("level_0_ranges", 1, 4097)),
+    ("level_0_ranges", with_entry("level_0_ranges", 0, -(2**31))),
+    ("level_0_allowed of pixel 0", without_a_label),
+    ("level_0_share_steps has another", with_entry("level_0_allowed", 0, 127)),
+    (
+        "level_2_allowed of pixel[0]",
+        lambda arrays: with_array("level_2_allowed", 0 * arrays["level_2_allowed"], "u1")(arrays),
     ),
-    "an unknown gauge": (of_instance(gauge="none"), "gauge"),
-    "a skew weight below 0": (of_instance(w_beta=-1e-9), "w_beta"),
-    "a skew weight that is no number": (of_instance(w_beta=np.nan), "w_beta"),
-    "an infinite weight of strokes": (of_instance(w_strokes=np.inf), "w_strokes"),
-    "true for a weight": (of_instance(w_strokes=True), "w_strokes"),
-    "a stroke direction of pi": (with_entry("instance_theta", 0, np.pi), "theta"),
-    "a stroke without weight": (with_entry("instance_w", 0, 0.0), "instance_w"),
-    "one stroke twice": (with_entry("instance_stroke_pixels", [2, 3], [0, 0]), "strokes"),
-    "a stroke at -1": (with_entry("instance_stroke_pixels", 0, -1), "stroke_pixels"),
-    "a field outside its window": (with_entry("alpha", 0, 4.0), "alpha"),
-    "a skew beyond pi/4": (with_entry("beta", 0, -0.8), "beta"),
-    "a great jump": (with_entry("p", 0, 65), "p[0]"),
-    "the least jump of 32 bits": (with_entry("p", 0, -(2**31)), "p[0]"),
-    "a far centre": (with_entry("centre_alpha", 0, -16.1), "centre_alpha"),
-    "a far centre of beta": (with_entry("centre_beta", 0, 16.1), "centre_beta"),
-    "a spacing of 0": (with_entry("level_0_h", 0, 0.0), "level_0_h"),
-    "a spacing below 0": (with_entry("level_0_h", 0, -0.1), "level_0_h"),
-    "a wide spacing": (with_entry("level_0_h", 0, 0.8), "level_0_h"),
-    "another spacing": (lambda a: a | {"level_1_h": a["level_0_h"] / 3}, "level_1_h"),
-    "no cell": (with_entry("level_0_ranges", 1, 1), "level_0_ranges"),
-    "a count below 0": (with_entry("level_0_ranges", 1, -9), "level_0_ranges"),
-    "many labels": (with_entry("level_0_ranges", 1, 4097), "level_0_ranges"),
-    "labels far away": (with_entry("level_0_ranges", 0, -(2**31)), "level_0_ranges"),
-    "a unit below 0": (with_entry("level_0_share_unit", 0, -1e-9), "share_unit"),
-    "a great unit": (with_entry("level_2_table_unit", 0, 1.1), "table_unit"),
-    "a quad at -1": (with_entry("level_2_quads", 0, -1), "level_2_quads"),
-    "a quad beyond the pixels": (with_entry("level_2_quads", 0, 4), "level_2_quads"),
-    "a pixel without a quad": (with_entry("level_2_quads", 0, 0), "level_2_quads"),
-    "a quad twice": (lambda a: a | {"level_2_quads": np.repeat(a["level_2_quads"], 2)}, "out of order"),
-    "a cut at no pixel": (lambda a: a | {"cuts": np.array([-2], "i4")}, "cuts"),
-    "a cut at no pair": (lambda a: a | {"cuts": np.array([8], "i4")}, "cuts"),
-    "a great multiplier": (with_entry("multipliers", 0, -2e6), "multipliers"),
-    "a claim below everything": (lambda a: with_head(a, bound=-np.inf), "bound is not in"),
-    "a claim that is no number": (lambda a: with_head(a, bound=np.nan), "bound is not in"),
-    "an infinite energy": (lambda a: with_head(a, energy=np.inf), "energy is not in"),
-    "levels that are no whole number": (lambda a: with_head(a, levels=2.5), "levels"),
-}
+    ("level 1, pixel 0", lambda arrays: arrays | {"level_0_share_unit": arrays["level_0_share_unit"] / 2}),
+    (
+        "level 1, pixel 2",
+        lambda arrays: with_entry("level_1_ranges", 8, arrays["level_1_ranges"][2, 0] + 1)(arrays),
+    ),
+    ("share_unit", with_entry("level_0_share_unit", 0, -1e-9)),
+    ("table_unit", with_entry("level_2_table_unit", 0, 1.1)),
+    ("level_2_quads", with_entry("level_2_quads", 0, -1)),
+    ("level_2_quads", with_entry("level_2_quads", 0, 4)),
+    ("level_2_quads", with_entry("level_2_quads", 0, 0)),
+    ("out of order", lambda arrays: arrays | {"level_2_quads": np.repeat(arrays["level_2_quads"], 2)}),
+    # The last step
+    ("cuts", with_array("cuts", [-2])),
+    ("cuts", with_array("cuts", [8])),
+    ("multipliers", with_entry("multipliers", 0, -2e6)),
+]
+"""Messages, and the changes that they refuse."""
+BROKEN_IN_NORM_1 = [
+    ("slopes", with_entry("slopes", 0, -1.1)),
+    ("level_0_quads needs the norm 2", with_array("level_0_quads", [2])),
+    ("centre_beta", with_entry("centre_beta", 0, 0.1)),
+    ("level_0_h", lambda arrays: arrays | {"level_0_h": arrays["level_0_h"] * (1 + 1e-12)}),
+    ("leaves out jumps of pair 1", with_cuts([5])),
+    ("leaves pieces out", with_cuts([0, -1])),
+    ("leaves pieces out", with_cuts([0, 0, -1, -1])),
+    ("has a piece too many", with_cuts([0, -1, -1, -1, -1, -1])),
+    ("is no pixel and no pair", with_cuts([99, -1, -1])),
+]
 
 
-def test_each_broken_assumption_is_refused_by_name(honest, subtests):
-    sound = check_certificate.read_arrays(str(honest("tables")))
+@pytest.mark.parametrize("kind, broken", [("tables", BROKEN), ("norm 1", BROKEN_IN_NORM_1)])
+def test_each_broken_assumption_is_refused_by_name(kind, broken, honest, subtests):
+    sound = check_certificate.read_arrays(str(honest(kind)))
     assert check_certificate.check_arrays(sound)
-    for kind, (change, message) in BROKEN.items():
-        with subtests.test(kind=kind), pytest.raises(REFUSED, match=re.escape(message)):
+    for number, (message, change) in enumerate(broken):
+        with (
+            subtests.test(message, number=number),
+            pytest.raises(REFUSED, match=re.escape(message)) as refusal,
+        ):
             check_certificate.check_arrays(change(sound))
-
-
-def test_tables_and_slopes_are_those_of_the_norm(honest):
-    sound = check_certificate.read_arrays(str(honest("norm 1")))
-    steep = np.full(len(sound["slopes"]), -1.1)
-    for change, message in (
-        ({"slopes": steep}, "slopes"),
-        ({"level_0_quads": np.array([2], "i4")}, "level_0_quads needs the norm 2"),
-        ({"centre_beta": sound["centre_beta"] + 0.1}, "centre_beta"),
-        ({"level_0_h": sound["level_0_h"] * (1 + 1e-12)}, "level_0_h"),
-    ):
-        with pytest.raises(REFUSED, match=message):
-            check_certificate.check_arrays(sound | change)
+        assert "\n" not in str(refusal.value)

@@ -3,10 +3,7 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.proof.certificate import write_certificate
 from crossfield.models.proof.descent import descent
-
-pytestmark = pytest.mark.numeric
 
 
 @pytest.mark.slow
@@ -22,4 +19,4 @@ def test_where_no_finer_level_fits_a_smaller_one_raises_the_bound(monkeypatch, t
     assert last.bound > before.bound
     # The checker has the best shares of later pixels, so it may prove more than the rounded ones.
     assert last.bound * (1 - 1e-5) <= proof.bound <= proof.energy
-    assert write_certificate(proof, tmp_path / "it.npz").bound == proof.bound
+    assert cf.write_certificate(proof, tmp_path / "it.npz").bound == proof.bound

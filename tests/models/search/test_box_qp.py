@@ -1,25 +1,18 @@
-"""The best angles for given jumps: conditions of optimality, hand calculations, and two other solvers."""
+"""The best angles for given jumps: conditions of optimality, and angles that the energy leaves open."""
 
 from dataclasses import replace
 
+import crossfield as cf
 import numpy as np
 import pytest
 from cases import make_field
-from crossfield.export.solving.local import solve
-from crossfield.models.field.field import CrossField
-from crossfield.models.formulations.problem import formulate
 from crossfield.models.instance.angles import HALF, QUARTER
-from crossfield.models.instance.instance import Instance
-from crossfield.models.samples.samples import sample, samples
 from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.reproducible_angles import reproducible_field
-from crossfield.models.smooth.polyvector import power_field
 from exhaustive import random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
-
-pytestmark = pytest.mark.numeric
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -61,7 +54,7 @@ def assert_optimal(field):
     skew_coefficient=st.sampled_from([0, 1e-6, 1e-3, 1]),
     stroke_coefficient=st.sampled_from([0, 1e-6, 1, 100]),
 )
-@settings(deadline=None, max_examples=200)
+@settings(deadline=None, max_examples=60)
 def test_random_jumps_are_fitted_to_the_optimum(seed, gauge, skew_coefficient, stroke_coefficient):
     instance = random_instance(seed, strokes=20, gauge=gauge)
     weights = {"skew_coefficient": skew_coefficient, "stroke_coefficient": stroke_coefficient}
@@ -74,52 +67,16 @@ def test_random_jumps_are_fitted_to_the_optimum(seed, gauge, skew_coefficient, s
 
 @pytest.mark.parametrize("gauge", ["strokes", "box"])
 def test_thousands_of_active_bounds_are_found(gauge):
-    instance = random_instance(3, (80, 100), 4000, gauge)
-    assert assert_optimal(fit_in_box(make_field(instance, 0))) > 1000
-
-
-def test_contact_along_the_strokes_of_a_drawing_is_found():
-    # Where strokes lean on the box for long stretches the right bounds are found slowly, from the ends.
-    assert assert_optimal(fit_in_box(power_field(sample("mouse", 96, gauge="box")))) > 200
-
-
-@pytest.mark.parametrize(
-    "name, size",
-    [
-        *((known.name, 24) for known in samples()[:3]),
-        pytest.param("ring", 48, marks=pytest.mark.slow),
-    ],
-)
-def test_same_optimum_as_ipopt_on_the_file(name, size):
-    instance = sample(name, size, gauge="box")
-    centre = CrossField(
-        instance,
-        (instance.alpha_lower + instance.alpha_upper) / 2,
-        np.zeros(instance.grid.size),
-        make_field(instance, size).p,
-    )
-    problem = formulate(instance, "qp-fixed", p=centre.p)
-    best, other = fit_in_box(centre), solve(problem, "ipopt", start=centre).field
-    assert assert_optimal(best) > 10
-    assert best.energy().total == pytest.approx(other.energy().total, rel=1e-8)
-
-
-def test_a_jump_between_two_strokes_costs_nothing():
-    # alpha stays at both strokes, since |A| = |0.3 - 0.3 - pi/2 + pi/2| = 0.
-    instance = Instance.on_pixels(
-        "two", [[True, True]], [[0, 0], [0, 1]], [0.3, 0.3 + HALF], [1.0, 1.0], skew_coefficient=0
-    )
-    field = fit_in_box(CrossField(instance, [0.0, HALF], [0.5, 0.1], [1]))
-    assert field.energy().total == pytest.approx(0, abs=1e-18)
-    assert field.alpha + field.beta == pytest.approx([0.3, 0.3 + HALF])
+    instance = random_instance(3, (50, 60), 1500, gauge)
+    assert assert_optimal(fit_in_box(make_field(instance, 0))) > 400
 
 
 def test_angles_stay_where_the_energy_does_not_say():
     mask = np.ones((3, 9), bool)
     mask[:, 4] = False
-    instance = Instance.on_pixels("parts", mask, [[0, 0]], [0.7], [1.0], skew_coefficient=0)
+    instance = cf.Instance.on_pixels("parts", mask, [[0, 0]], [0.7], [1.0], skew_coefficient=0)
     rng = np.random.default_rng(0)
-    start = CrossField(instance, *rng.uniform(0.3, 0.5, (2, 24)), np.zeros(len(instance.p_min)))
+    start = cf.CrossField(instance, *rng.uniform(0.3, 0.5, (2, 24)), np.zeros(len(instance.p_min)))
     field = fit_in_box(start)
     apart = instance.grid.columns > 4
     for before, after in ((start.alpha, field.alpha), (start.beta, field.beta)):
@@ -128,21 +85,14 @@ def test_angles_stay_where_the_energy_does_not_say():
     assert field.energy().total == pytest.approx(0, abs=1e-18)
 
 
-def test_the_optimum_comes_back_as_it_is():
-    best = fit_in_box(make_field(random_instance(7, (12, 12), 70, "box"), 7))
-    again = fit_in_box(best)
-    assert again.alpha.tobytes() == best.alpha.tobytes()
-    assert again.beta.tobytes() == best.beta.tobytes()
-
-
 @for_each("gauge", ["strokes", "box"])
-@for_each("seed", range(6))
+@for_each("seed", range(3))
 def test_pinned_angles_depend_on_the_jumps_alone(seed, gauge):
     instance = random_instance(seed, (4, 5), 10, gauge)
     field, other = (make_field(instance, number) for number in (seed, seed + 100))
     pinned, same = (
         reproducible_field(field),
-        reproducible_field(CrossField(instance, other.alpha, other.beta, field.p)),
+        reproducible_field(cf.CrossField(instance, other.alpha, other.beta, field.p)),
     )
     assert pinned.alpha.tobytes() == same.alpha.tobytes()
     assert pinned.beta.tobytes() == same.beta.tobytes()
@@ -166,7 +116,7 @@ def test_pinned_angles_are_optimal_where_the_energy_does_not_say_all(skew_coeffi
 
 def test_pinned_angles_of_a_part_without_strokes_stay():
     mask = np.array([[True, True, False, True, True]])
-    instance = Instance.on_pixels("parts", mask, np.array([[0, 0]]), np.array([0.3]), np.ones(1))
+    instance = cf.Instance.on_pixels("parts", mask, np.array([[0, 0]]), np.array([0.3]), np.ones(1))
     alpha = np.array([0.3, 0.3, 0.7, 0.7])
-    field = reproducible_field(CrossField(instance, alpha, np.zeros(4), np.zeros(2, int)))
+    field = reproducible_field(cf.CrossField(instance, alpha, np.zeros(4), np.zeros(2, int)))
     assert field.alpha.tolist() == alpha.tolist()

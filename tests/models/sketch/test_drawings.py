@@ -7,10 +7,9 @@ has a curvature line, whose direction in steps of two degrees is its value less 
 import re
 import tomllib
 
+import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import InputError
-from crossfield.models.sketch.read import read_sketch
 from PIL import Image
 from places import ROOT
 from scipy import ndimage
@@ -52,10 +51,10 @@ def options_of(drawing):
 def test_a_drawing_is_read_as_it_looks(drawing):
     path = FOLDER / drawing["file"]
     if "error" in drawing:
-        with pytest.raises(InputError, match=drawing["error"]):
-            read_sketch(path)
+        with pytest.raises(cf.InputError, match=drawing["error"]):
+            cf.read_sketch(path)
         return
-    instance = read_sketch(path, **options_of(drawing))
+    instance = cf.read_sketch(path, **options_of(drawing))
     expected = np.asarray(Image.open(FOLDER / "expected" / f"{drawing['picture']}.png")).astype(int)
     read = picture_of(instance)
     assert read.shape == expected.shape, f"the grid has {read.shape} pixels instead of {expected.shape}"

@@ -1,14 +1,13 @@
 """Hatching and ruled paper, and families of curvature lines that are neither."""
 
+from functools import cache
+
+import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.samples.samples import samples
-from crossfield.models.sketch.drawing_file import parse_drawing
-from crossfield.models.sketch.parallels import find_parallels, leave_out_parallels
-from crossfield.models.sketch.read import instance_of_drawing
-from crossfield.models.sketch.samples import sample_svg
-from crossfield.models.sketch.svg import read_svg
+from loops import for_each
 from places import ROOT
+from small_drawings import read, svg
 
 SHARED = ROOT.parent / "shared" / "sketches"
 BODY = '<circle cx="150" cy="150" r="90" fill="none" stroke="black"/>'
@@ -24,84 +23,63 @@ def rows(start, step, count, colour):
     )
 
 
+@cache
 def drawing(*parts):
-    return read_svg(
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 300 300">{"".join(parts)}</svg>'.encode()
-    )
+    return read(svg("".join(parts), 'viewBox="0 0 300 300"'))
 
 
 HATCHING = rows((90, 180, 130, 200), (3, -3), 14, "gray")
-TWICE = HATCHING + rows((90.5, 180, 130.5, 201), (3, -3), 14, "gray")
 RULED = rows((0, 20, 300, 20), (0, 30), 9, "steelblue")
-NOTEBOOK = (
-    RULED + rows((36, 0, 36, 300), (0, 0), 1, "red") + rows((0, 290, 120, 290), (150, 0), 2, "steelblue")
-)
-SQUARED = RULED + rows((15, 0, 15, 300), (30, 0), 10, "steelblue")
+ACROSS = rows((80, 150, 110, 90), (0, 0), 1, "red")
 
 
-@pytest.mark.parametrize(
-    "parallels, kinds",
+@for_each(
+    "parallels, flow",
     [
-        (HATCHING, ["hatching"]),
-        (TWICE, ["hatching"]),
-        (RULED, ["ruled paper"]),
-        (NOTEBOOK, ["ruled paper"]),
-        (SQUARED, 2 * ["ruled paper"]),
+        (HATCHING, FLOW),
+        (HATCHING + rows((90.5, 180, 130.5, 201), (3, -3), 14, "gray"), FLOW),  # drawn twice
+        (RULED, FLOW),
+        (RULED + rows((36, 0, 36, 300), (0, 0), 1, "red"), FLOW),  # with a margin
+        (RULED + rows((15, 0, 15, 300), (30, 0), 10, "steelblue"), FLOW),
+        (rows((90, 180, 110, 190), (3, -3), 8, "gray"), FLOW + ACROSS),  # a line across them is no margin
     ],
 )
-def test_hatching_and_ruled_paper_are_left_out(parallels, kinds):
-    plain, full = drawing(BODY, FLOW), drawing(parallels, BODY, FLOW)
-    assert [family.kind for family in find_parallels(full)] == kinds
-    left = leave_out_parallels(full)
-    np.testing.assert_array_equal(left.points, plain.points)
-    assert all("left out" in note for note in left.notes)
-    options = {"name": "body", "source": "body.svg"}
-    read = instance_of_drawing(full, 24, **options)
-    assert (read.mask == instance_of_drawing(plain, 24, **options).mask).all()
-    assert read.reading.warnings[: len(kinds)] == left.notes
+def test_hatching_and_ruled_paper_are_left_out_and_reported(parallels, flow):
+    plain, full = drawing(BODY, flow), drawing(parallels, BODY, flow)
+    assert full.sha256 == plain.sha256
+    assert full.reading.warnings
+    assert all("are left out as hatching" in warning for warning in full.reading.warnings)
 
 
-def test_a_hatching_drawn_twice_is_counted_once():
-    once, twice = (find_parallels(drawing(lines, BODY))[0] for lines in (HATCHING, TWICE))
-    assert once.count == twice.count == 14
-    assert len(twice.curve) == 28
-    np.testing.assert_allclose(once.middle, [129.5, 170.5])
+def test_a_family_is_reported_with_its_place():
+    (note,) = drawing(HATCHING, BODY, FLOW).reading.warnings
+    assert note.startswith("14 parallel lines round (129.5, 170.5) are left out")
 
 
-def test_hatching_among_curvature_lines_stays_with_a_warning():
-    curves = drawing(BODY, FLOW, HATCHING.replace("gray", "red"))
-    left = leave_out_parallels(curves)
-    assert len(left.points) == len(curves.points)
-    (note,) = left.notes
-    assert note.startswith("14 parallel lines round (129.5, 170.5) look like hatching, but count as")
-
-
-NEITHER = {
-    "rulings of a cylinder": BODY + rows((110, 80, 110, 220), (10, 0), 9, "red"),
-    "few close lines": BODY + rows((110, 80, 110, 220), (4, 0), 8, "red"),
-    "uneven lines": BODY
-    + "".join(rows((x, 90, x, 210), (0, 0), 1, "red") for x in 120 + np.arange(12) ** 1.7),
-    "a sheet": rows((50, 50, 250, 50), (0, 20), 11, "black") + rows((50, 50, 50, 250), (20, 0), 11, "black"),
-    "a fan": BODY
-    + "".join(
-        rows((150, 150, *end), (0, 0), 1, "gray") for end in 300 * np.random.default_rng(0).random((40, 2))
-    ),
-    "ticks in a row": BODY + rows((80, 150, 80, 155), (9, 0), 15, "gray"),
-}
-
-
-@pytest.mark.parametrize("name", NEITHER)
-def test_other_lines_are_no_hatching(name):
-    assert find_parallels(drawing(NEITHER[name])) == []
-
-
-@pytest.mark.parametrize("name", [sample.name for sample in samples() if sample.kind == "sketch"])
-def test_samples_have_no_hatching(name):
-    assert find_parallels(read_svg(sample_svg(name).encode())) == []
+@for_each(
+    "lines",
+    [
+        BODY + HATCHING.replace("gray", "red"),
+        BODY + rows((90, 180, 110, 200), (3, -3), 7, "gray"),
+        BODY
+        + "".join(
+            rows((150, 150, *end), (0, 0), 1, "gray")  # a fan
+            for end in 300 * np.random.default_rng(0).random((40, 2))
+        ),
+        BODY + rows((110, 80, 140, 80), (0, 14), 9, "black"),  # a grille
+        "".join(  # an edge in pieces
+            rows((x, 150 - x / 50, x + 4, 150 - (x + 4) / 50), (0, 0), 1, "black") for x in range(80, 220, 4)
+        ),
+        BODY + rows((80, 150, 80, 155), (9, 0), 15, "gray"),  # ticks in a row
+    ],
+)
+def test_other_lines_are_no_hatching(lines):
+    assert not any("hatching" in warning for warning in drawing(lines, FLOW).reading.warnings)
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="needs the drawings in ../shared/sketches")
 def test_real_drawings_have_no_hatching():
     for path in sorted(SHARED.iterdir()):
         if path.suffix in (".svg", ".scap", ".curves"):
-            assert find_parallels(parse_drawing(path.read_bytes(), path.suffix, 24)) == [], path.name
+            warnings = cf.read_sketch(path).reading.warnings
+            assert not any("hatching" in warning for warning in warnings), path.name

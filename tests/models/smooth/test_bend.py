@@ -1,19 +1,17 @@
 """The bend field and its start: exact on constant crosses, near the truth on surfaces."""
 
+import itertools
 from dataclasses import replace
 
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.runs.methods import METHODS, Request
 from crossfield.models.instance.angles import HALF
-from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, _Bend, bend_field, tremble
-from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
+from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, tremble
+from crossfield.models.smooth.polyvector import HOLDS
 from exhaustive import sketch
 from loops import for_each
 from moves import MOVES, lines
-
-pytestmark = pytest.mark.numeric
 
 
 def noisy(instance, degrees, seed):
@@ -53,99 +51,87 @@ def bend_energy(field, hold=HOLD):
     )
 
 
-@for_each("degrees", [(0, 90), (20, 110), (100, 40), (135, 100), (179, 60)])
+@for_each("degrees", [(0, 90), (100, 40), (179, 60)])
 def test_constant_crosses_stay(degrees):
     theta = np.full((6, 7), np.nan)
     theta[:, 1], theta[:, 5] = np.radians(degrees)
     instance = replace(sketch(np.ones((6, 7), bool), theta), skew_coefficient=0)
     angles = [np.full(42, np.radians(angle)) for angle in degrees]
-    field = bend_field(cf.CrossField.from_lines(instance, *angles))
+    field = cf.bend_field(cf.CrossField.from_lines(instance, *angles))
     assert field.cross_error(*angles) == pytest.approx(np.zeros(42), abs=1e-9)
     assert bend_energy(field) < 1e-12
 
 
-@for_each("name", ["singular", "saddle", "mouse", "bottle"])
+@for_each("name", ["singular", "bottle"])
 def test_the_energy_falls_and_the_singularities_stay(name):
     """The energy recomputed pixel by pixel: that of the start is above, and bending again never raises it.
 
     The greedy field of light strokes lies far from strokes that are then held harder.
     """
     start, hold = cf.greedy_field(replace(cf.sample(name, 16), stroke_coefficient=1)), 1.5
-    field = bend_field(start, harmonic=HARMONIC, hold=hold)
+    field = cf.bend_field(start, harmonic=HARMONIC, hold=hold)
     assert bend_energy(field, hold) < 0.8 * bend_energy(start, hold)
     assert field.singularities.index.tolist() == start.singularities.index.tolist()
-    again = bend_field(field, harmonic=HARMONIC, hold=hold)
+    again = cf.bend_field(field, harmonic=HARMONIC, hold=hold)
     assert bend_energy(again, hold) <= bend_energy(field, hold) * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("moved_instance", MOVES)
 def test_the_field_moves_with_the_sketch(moved_instance):
     move, turn = MOVES[moved_instance]
-    for instance in (cf.sample("mouse", 20), cf.sample("singular", 16)):
-        start, other = polyvector_field(instance, hold=max(HOLDS)), moved_instance(instance)
+    for instance in (cf.sample("mouse", 14), cf.sample("singular", 12)):
+        start, other = cf.polyvector_field(instance, hold=max(HOLDS)), moved_instance(instance)
 
         def there(field, mask=other.mask):
             return [turn(move(field.image(line)))[mask] for line in lines(field)]
 
-        plain = polyvector_field(other, hold=max(HOLDS))
+        plain = cf.polyvector_field(other, hold=max(HOLDS))
         assert plain.cross_error(*there(start)) == pytest.approx(0, abs=1e-6)
         assert plain.energy().total == pytest.approx(start.energy().total, rel=1e-6)
-        moved = bend_field(cf.CrossField.from_lines(other, *there(start)))
-        assert moved.cross_error(*there(bend_field(start))) == pytest.approx(0, abs=1e-6)
+        moved = cf.bend_field(cf.CrossField.from_lines(other, *there(start)))
+        assert moved.cross_error(*there(cf.bend_field(start))) == pytest.approx(0, abs=1e-6)
 
 
 def test_labels_do_not_matter():
     instance = cf.sample("singular", 16)
     start = cf.greedy_field(instance)
-    field = bend_field(start)
-    boxed = bend_field(cf.CrossField.from_lines(instance.with_gauge("box"), *lines(start)))
+    field = cf.bend_field(start)
+    boxed = cf.bend_field(cf.CrossField.from_lines(instance.with_gauge("box"), *lines(start)))
     assert (boxed.p != field.p).any()
     assert field.cross_error(*lines(boxed)) == pytest.approx(0, abs=1e-6)
 
 
-@for_each(
-    "surface",
-    [("tilted_cylinder", 0.1, 1.2), ("torus_patch", 1.8, 4.5), ("wave_sheet", 0.3, 2.5)],
-)
-def test_the_field_is_near_the_true_curvature_lines(surface, tmp_path):
+@for_each("surface", [("tilted_cylinder", 0.1, 1.2), ("torus_patch", 1.8, 4.5), ("wave_sheet", 0.3, 2.5)])
+def test_the_field_is_near_the_true_curvature_lines(surface):
     """Mean degrees with exact strokes, and with 3 degrees of noise on each stroke pixel."""
     name, clean, rough = surface
     true = cf.analytic(name, 48)
     for degrees, most in ((0, clean), (3, rough)):
-        (candidate,) = METHODS["bend"].find(Request(noisy(true.instance, degrees, seed=1), tmp_path))
-        assert np.degrees(candidate.field.cross_error(true.u_angle, true.v_angle).mean()) <= most
+        field = cf.bend_field(cf.polyvector_field(noisy(true.instance, degrees, seed=1), hold=max(HOLDS)))
+        assert np.degrees(field.cross_error(true.u_angle, true.v_angle).mean()) <= most
 
 
 def test_fields_are_as_smooth_as_the_strokes_tremble():
     """Clean strokes get the least plain smoothness, those with 8 degrees of noise the most."""
     clean = cf.analytic("wave_sheet", 48).instance
     for degrees, harmonic, other in ((0, 0.01, HARMONIC), (8, HARMONIC, 0.01)):
-        start = polyvector_field(noisy(clean, degrees, seed=1), hold=max(HOLDS))
-        field = bend_field(start)
-        near, far = (bend_field(start, harmonic=weight).alpha for weight in (harmonic, other))
+        start = cf.polyvector_field(noisy(clean, degrees, seed=1), hold=max(HOLDS))
+        field = cf.bend_field(start)
+        near, far = (cf.bend_field(start, harmonic=weight).alpha for weight in (harmonic, other))
         assert np.abs(field.alpha - near).max() < 1e-4
         assert np.abs(field.alpha - far).max() > 1e-3
-    starts = [polyvector_field(noisy(clean, 3, seed), hold=max(HOLDS)) for seed in range(4)]
-    trembles = [tremble(bend_field(start, harmonic=HARMONIC)) for start in starts]
+    starts = [cf.polyvector_field(noisy(clean, 3, seed), hold=max(HOLDS)) for seed in range(4)]
+    trembles = [tremble(cf.bend_field(start, harmonic=HARMONIC)) for start in starts]
     assert np.mean(trembles) == pytest.approx(TREMBLE, rel=0.15)
 
 
-def test_rounds_end_when_the_time_is_over():
-    """The function is called once per round; the present result is returned, or the start without one."""
-    start = polyvector_field(cf.sample("mouse", 16), hold=max(HOLDS))
-    calls = []
+def test_more_rounds_lower_the_energy_and_none_returns_the_start():
+    start = cf.polyvector_field(cf.sample("mouse", 16), hold=max(HOLDS))
 
-    def is_over_after(rounds):
-        calls.append(rounds)
-        return len(calls) > rounds
+    def bent(rounds):
+        asked = itertools.count()
+        return cf.bend_field(start, harmonic=HARMONIC, stop=lambda: next(asked) >= rounds)
 
-    assert bend_field(start, stop=lambda: is_over_after(0)) is start
-    energies = []
-    for rounds in (1, 2, 3):
-        calls.clear()
-        field = bend_field(start, harmonic=HARMONIC, stop=lambda rounds=rounds: is_over_after(rounds))
-        assert len(calls) == rounds + 1
-        energies.append(_Bend.of(start, HARMONIC, HOLD).at(np.concatenate([field.u_angle, field.v_angle]))[0])
+    assert bent(0) is start
+    energies = [bend_energy(bent(rounds)) for rounds in (1, 2, 3)]
     assert energies == sorted(energies, reverse=True)
-    whole = bend_field(start)
-    assert np.array_equal(bend_field(start, stop=lambda: False).alpha, whole.alpha)

@@ -1,23 +1,20 @@
 """The PolyVector field: exact on constant directions, at any angle."""
 
+import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.instance.angles import line_difference
-from crossfield.models.instance.instance import Instance
-from crossfield.models.samples.samples import sample
-from crossfield.models.smooth.polyvector import HOLDS, polyvector_field
+from crossfield.models.smooth.polyvector import HOLDS
 from exhaustive import sketch
 from loops import for_each
 from moves import lines
-
-pytestmark = pytest.mark.numeric
 
 
 @for_each("degrees", [10, 35, 60, 90])
 def test_two_families_at_any_angle_are_exact(degrees):
     theta = np.full((8, 8), np.nan)
     theta[:, 1], theta[:, 5] = np.radians(100), np.radians(100 - degrees)
-    field = polyvector_field(sketch(np.ones((8, 8), bool), theta, skew_coefficient=0))
+    field = cf.polyvector_field(sketch(np.ones((8, 8), bool), theta, skew_coefficient=0))
     assert field.energy().total < 1e-9
     assert field.cross_error(
         np.full(64, np.radians(100)), np.full(64, np.radians(100 - degrees))
@@ -25,10 +22,10 @@ def test_two_families_at_any_angle_are_exact(degrees):
 
 
 def test_a_hard_hold_keeps_the_strokes():
-    instance = sample("mouse", 24)
+    instance = cf.sample("mouse", 24)
     off = []
     for hold in HOLDS:
-        u, v = lines(polyvector_field(instance, hold=hold))
+        u, v = lines(cf.polyvector_field(instance, hold=hold))
         at = instance.stroke_index
         off.append(
             np.minimum(line_difference(u[at], instance.theta), line_difference(v[at], instance.theta)).mean()
@@ -40,9 +37,9 @@ def test_a_hard_hold_keeps_the_strokes():
 def test_one_pixel_under_the_heaviest_strokes_is_solved():
     """Its system has one equation for two unknowns, which a heavy weight must not drown the pull of."""
     for theta in np.linspace(0, 3.1, 40):
-        one = Instance.on_pixels(
+        one = cf.Instance.on_pixels(
             "one", [[True]], [[0, 0]], [theta], [1.0], stroke_coefficient=1e6, skew_coefficient=0.0
         )
         for hold in HOLDS:
-            field = polyvector_field(one, hold=hold)
+            field = cf.polyvector_field(one, hold=hold)
             assert field.stroke_deviation.max() < 1e-6

@@ -1,0 +1,73 @@
+"""Measures of a field: its energy, its shape, and its singularities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..instance.domain import Floats, Ints
+from ..instance.instance import Instance
+
+
+@dataclass(frozen=True)
+class Energy:
+    """The three sums of an energy and their total, each already weighted."""
+
+    smooth: float
+    strokes: float
+    beta: float
+
+    @property
+    def total(self) -> float:
+        """Smooth + strokes + beta."""
+        return self.smooth + self.strokes + self.beta
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Measures of a field that a designer sees, independent of energy and weights.
+
+    mean_deviation, most_deviation: mean and 90 % quantile of `CrossField.stroke_deviation`. far_strokes:
+    share of the strokes where it exceeds 10 degrees. narrow_pixels: share of all pixels whose lines are less
+    than 45 degrees apart.
+    """
+
+    mean_deviation: float
+    most_deviation: float
+    far_strokes: float
+    narrow_pixels: float
+
+
+@dataclass(frozen=True)
+class Singularities:
+    """Rings around which the crosses turn.
+
+    instance: on whose domain. ring: number of each, (k,). index: turns of the cross on a counter-clockwise
+    walk, (k,), multiples of 1/4; on a closed mesh they add up to the Euler characteristic.
+    """
+
+    instance: Instance
+    ring: Ints
+    index: Floats
+
+    @property
+    def row(self) -> Ints:
+        """Row of the upper left of the four pixels of each ring of a grid, (k,)."""
+        return self.instance.grid.rows[self._corner] - 1
+
+    @property
+    def column(self) -> Ints:
+        """Column of the upper left of the four pixels of each ring of a grid, (k,)."""
+        return self.instance.grid.columns[self._corner]
+
+    @property
+    def vertex(self) -> Ints:
+        """Vertex inside each ring of a mesh, (k,)."""
+        return self.instance.mesh.ring_vertices[self.ring]
+
+    @property
+    def _corner(self) -> Ints:
+        """The lower left pixel of each ring of a grid, where its first pair begins."""
+        grid = self.instance.grid
+        return np.asarray(grid.first[grid.quads[self.ring, 0]])

@@ -1,0 +1,291 @@
+"""Charges of rings, and clouds that bound their energy from below: docs/orthogonal-proofs.md, section 5.
+
+The best clouds for a potential fill a background, as sand that topples; the best potential for given clouds
+is that of a convex problem, in which parts of particles may appear. A stage finds them in turns, and the next
+one has the particles that are left. The checker computes all bounds anew, so nothing here has to be exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, diags_array
+from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
+
+from ...array_archive import Arrays
+from ...instance.angles import HALF
+from ...instance.domain import Bools, Domain, Floats
+from ...instance.sparse_systems import factor_matrix
+from ...processes.compilation import compiled, compiled_inside
+from ..checkers.check_orthogonal import (
+    MOST_STAGES,
+    RELATIVE,
+    STAGE_PARTS,
+    CentredRows,
+    Charges,
+    Clouds,
+    spans,
+    stage_of,
+    starts_of,
+)
+
+Indices = NDArray[np.int64]
+Laplacian = tuple[Indices, Indices, Floats, Floats]  # begin, column, entry, resistance of `Charges`
+Places = tuple[Floats, Bools, Bools]
+Cloud = tuple[Indices, Indices, Floats]
+
+_MOST_CELLS: Final = 400  # of a cloud
+_MOST_ENTRIES: Final = 8_000_000  # of all clouds
+_SWEEPS: Final = 400  # in which sand topples
+_OVER: Final = 1.5  # relaxation
+_STILL: Final = 1e-7  # excess of sand, in particles, that topples no more
+_LEAST: Final = 1e-5  # background below which sand is not spread thinner
+_DIGITS: Final = 9  # of charges: those that symmetry makes equal are, however a mesh is numbered
+_ROUNDS: Final = 12  # of a stage
+_STEPS: Final = 300  # of gradients for a potential
+_HALVINGS: Final = 60  # of the range of a multiplier
+_GAIN: Final = 1e-4  # relative: by which another round, or stage, has to raise the bound
+
+
+def charge_arrays(domain: Domain, rows: CentredRows, threshold: float, is_over: Callable[[], bool]) -> Arrays:
+    """The arrays of charges in a certificate; none without rings.
+
+    threshold: as of `Proof`. is_over: whether the work has to end.
+    """
+    arrays = _ring_loops(domain, rows) if len(domain.rings.defect) else {}
+    if not arrays or len(arrays["loop_start"]) == 1:
+        return {}
+    charges, best = Charges(arrays, rows), 0.0
+    if charges.most.max() > np.iinfo(np.uint8).max:
+        return {}
+    remaining, stages = charges.most, _Stages(charges)
+    for number in range(MOST_STAGES):
+        stage, bound, after = stages.stage(remaining, threshold, is_over)
+        if number and bound < best + _GAIN * threshold:
+            break
+        arrays |= {f"stage_{number}_{part}": array for part, array in stage.items()}
+        arrays["stages"] = np.array([number + 1], np.int32)
+        best = max(best, bound)
+        if is_over() or bound >= threshold or (after == remaining).all():
+            break
+        remaining = after
+    return arrays
+
+
+def _ring_loops(domain: Domain, rows: CentredRows) -> Arrays:
+    """The arrays of loops: rings without rows of too little weight, neighbours close to each other."""
+    rings, count = domain.rings, len(domain.rings.defect)
+    ring = np.repeat(np.arange(count), np.diff(rings.start))
+    light = np.bincount(ring, rows.weight[rings.pair] < RELATIVE, count) > 0
+    uses = coo_array((np.ones(len(ring)), (ring, rings.pair)), shape=(count, rows.pairs)).tocsr()
+    order = reverse_cuthill_mckee((uses @ uses.T).tocsr(), symmetric_mode=True)
+    order = order[~light[order]]
+    sizes = np.diff(rings.start)[order]
+    steps = spans(rings.start[order], sizes)
+    return {
+        "loop_start": starts_of(sizes).astype(np.int32),
+        "loop_row": rings.pair[steps],
+        "loop_sign": rings.sign[steps].astype(np.int8),
+    }
+
+
+class _Stages:
+    """Stages of charges. part (l,): of each loop; whole: whether charges of a part add up to 0."""
+
+    def __init__(self, charges: Charges) -> None:
+        line = np.repeat(np.arange(charges.size), np.diff(charges.begin))
+        shape, places = (charges.size, charges.size), (line, charges.column)
+        near = coo_array((charges.entry, places), shape=shape).tocsr()
+        count, self.part = connected_components(near, directed=False)
+        self.whole = np.bincount(self.part, ~charges.closed, count) == 0
+        self.charges, self.laplacian = charges, (diags_array(charges.resistance) - near).tocsr()
+        self.inverse = factor_matrix(self.laplacian, pull=1e-9 * float(charges.resistance.max()))
+
+    def stage(
+        self, most: Indices, threshold: float, is_over: Callable[[], bool]
+    ) -> tuple[Arrays, float, Indices]:
+        """The arrays of a stage with these particles, its bound, and the particles that it leaves."""
+        charges, best, potential = self.charges, -np.inf, np.zeros(self.charges.size)
+        places, shares = self._places(most), np.zeros(int(most.sum()))
+        for _ in range(_ROUNDS):
+            start, cell, weight = self._spread(most, places, charges.origin + self.laplacian @ potential)
+            clouds = Clouds(charges, most, start, cell, weight)
+            _, added, kind = stage_of(charges, clouds, potential, np.zeros(charges.size))
+            price = self._best_price(clouds, added, kind)
+            bound, added, kind = stage_of(charges, clouds, potential, price)
+            if bound > best:
+                parts = *most, potential, price, start, cell, weight
+                remaining = clouds.remaining(bound, added, kind, threshold)
+            if bound < best + _GAIN * threshold or is_over():
+                break
+            best = bound
+            shares, potential = self._better_potential(clouds, kind, shares, is_over)
+        kinds = zip(STAGE_PARTS.items(), parts, strict=True)
+        return {name: array.astype(kind) for (name, kind), array in kinds}, max(best, bound), remaining
+
+    def _potential_of(self, numbers: Floats) -> Floats:
+        """The potential of charges, less their means in parts where they add up to 0."""
+        mean = np.bincount(self.part, numbers) / np.bincount(self.part)
+        return np.asarray(self.inverse(numbers - np.where(self.whole, mean, 0.0)[self.part]))
+
+    def _places(self, most: Indices) -> tuple[Bools, Bools]:
+        """Where clouds of a sign may lie, and loops whose own particle may have one: (2, l) each.
+
+        Clouds of both signs stay apart: where they would meet, loops of charges nearer 0 have none.
+        """
+        origin, (first, second) = self.charges.origin.round(_DIGITS), self.charges.links
+        positive = (most[1] == 0) & ((most[0] > 0) | (origin >= 0))
+        negative, both = (most[0] == 0) & ~positive, most.min(axis=0) > 0
+        home = np.array([positive | (both & (origin >= 0)), negative | (both & (origin < 0))])
+        meet = (home[0][first] & home[1][second]) | (home[1][first] & home[0][second])
+        strength = np.abs(origin) + 10.0**-_DIGITS * (origin < 0)  # in a tie, the negative one
+        weaker = np.where(strength[first] < strength[second], first, second)[meet]
+        home[:, weaker] = False
+        return np.array([positive, negative]) & home, home
+
+    def _spread(
+        self, most: Indices, places: tuple[Bools, Bools], background: Floats
+    ) -> tuple[Indices, Indices, Floats]:
+        """The clouds of all particles that fill the background best: starts, loops and weights."""
+        charges, parts = self.charges, list[tuple[Indices, Indices, Floats]]()
+        for side, sign in enumerate((1, -1)):
+            loop = np.nonzero(most[side])[0]
+            cells = max(min(_MOST_CELLS, _MOST_ENTRIES // max(len(loop), 1)), 1)
+            parts.append(
+                _topple(
+                    (charges.begin, charges.column, charges.entry, charges.resistance),
+                    (np.maximum(sign * background, _LEAST), *(place[side] for place in places)), loop, cells,
+                )
+            )  # fmt: skip
+        count, cell, weight = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+        return starts_of(count), cell, weight.astype(np.float32).astype(float)
+
+    def _best_price(self, clouds: Clouds, added: Floats, kind: Indices) -> Floats:
+        """The Lagrange multiplier of each loop for the sum of charges in its part, where that is 0."""
+        sign, part, added = clouds.sign[kind], self.part[clouds.loop[kind]], added / HALF**2
+
+        def total(price: Floats) -> Floats:
+            return np.bincount(part, sign * (added < sign * price[part]), len(self.whole))
+
+        wanted = np.round(np.bincount(self.part, self.charges.origin, len(self.whole)))
+        price = self._multipliers(total, wanted, 1 + float(np.abs(added).max(initial=0.0)))
+        return np.asarray(price[self.part])
+
+    def _multipliers(self, total: Callable[[Floats], Floats], wanted: Floats, far: float) -> Floats:
+        """The greatest multiplier of each part below `far` whose total is too small; 0 if none is due."""
+        low, high = np.full(len(self.whole), -far), np.full(len(self.whole), far)
+        for _ in range(_HALVINGS):
+            middle = (low + high) / 2
+            few = total(middle) < wanted
+            low, high = np.where(few, middle, low), np.where(few, high, middle)
+        return np.where(self.whole, low, 0.0)
+
+    def _better_potential(
+        self, clouds: Clouds, kind: Indices, shares: Floats, is_over: Callable[[], bool]
+    ) -> tuple[Floats, Floats]:
+        """Minimum-energy shares of particles in [0, 1], for given clouds, and their potential.
+
+        Accelerated projected gradients (Beck and Teboulle 2009), restarted where they turn back.
+        """
+        charges, shape = self.charges, (len(clouds.loop), self.charges.size)
+        weights = csr_array((clouds.weight, (clouds.owner, clouds.cell)), shape=shape)
+        unit = csr_array((np.ones(len(clouds.loop)), (np.arange(len(clouds.loop)), clouds.loop)), shape=shape)
+        smeared: Any = (diags_array(clouds.sign.astype(float)) @ (unit - weights @ self.laplacian)).tocsr()
+        _, fixed, _ = stage_of(charges, clouds, np.zeros(charges.size), np.zeros(charges.size))
+        fixed = fixed / HALF**2
+        back = smeared.T.tocsr()
+
+        def charge(numbers: Floats) -> Floats:
+            return np.asarray(back @ np.bincount(kind, numbers, len(clouds.loop)))
+
+        def reply(numbers: Floats) -> Floats:
+            return np.asarray((smeared @ self._potential_of(numbers))[kind])
+
+        vector = np.cos(np.arange(len(kind)))
+        for _ in range(15):
+            vector = reply(charge(vector))
+            length = float(np.linalg.norm(vector))
+            vector /= max(length, 1e-300)
+        step, sign = 0.45 / max(length, 1e-300), clouds.sign[kind]
+        part = self.part[clouds.loop[kind]]
+        shares = self._project(shares, sign, part)
+        ahead, pace = shares, 1.0
+        for number in range(_STEPS):
+            slope = 2 * reply(charge(ahead) - charges.origin) + fixed
+            new = self._project(ahead - step * slope, sign, part)
+            step_taken = new - shares
+            pace = 1.0 if (ahead - new) @ step_taken > 0 else pace
+            next_pace = (1 + np.sqrt(1 + 4 * pace * pace)) / 2
+            ahead, moved = new + (pace - 1) / next_pace * step_taken, np.abs(step_taken).max(initial=0.0)
+            shares, pace = new, next_pace
+            if moved < _STILL or (number % 10 == 9 and is_over()):
+                break
+        return shares, self._potential_of(charge(shares) - charges.origin)
+
+    def _project(self, shares: Floats, sign: Indices, part: Indices) -> Floats:
+        """The nearest shares in [0, 1] with the sums of parts whose charges add up to 0."""
+
+        def projected(shift: Floats) -> Floats:
+            return np.clip(shares + sign * shift[part], 0, 1)
+
+        def total(shift: Floats) -> Floats:
+            return np.bincount(part, sign * projected(shift), len(self.whole))
+
+        wanted = np.bincount(self.part, self.charges.origin, len(self.whole))
+        return projected(self._multipliers(total, wanted, 2 + float(np.abs(shares).max(initial=0.0))))
+
+
+@compiled
+def _topple(
+    laplacian: Laplacian, places: Places, loop: Indices, most: int
+) -> tuple[Indices, Indices, Floats]:
+    """Spread each particle until no loop has more than its room: the divisible sandpile.
+
+    places: the room of each loop, whether clouds may lie there, and whether that of its own particle may.
+    most: loops of a cloud. Returns how many loops all clouds have, and these loops, ascending, and weights.
+    """
+    count, place = np.zeros(len(loop), np.int64), np.full(len(places[0]), -1)
+    cells, weights = np.empty(len(loop) * most, np.int64), np.empty(len(loop) * most)
+    local, numbers, filled = np.empty(most, np.int64), np.zeros((2, most)), 0
+    for a in range(len(loop)):
+        if not places[2][loop[a]]:
+            continue
+        size, local[0], place[loop[a]], numbers[0, 0], numbers[1, 0] = 1, loop[a], 0, 0.0, 1.0
+        for _ in range(_SWEEPS):
+            size, moved = _sweep(laplacian, places, (place, local, numbers), size)
+            if moved < _STILL:
+                break
+        for j in np.sort(local[:size]):
+            if numbers[0, place[j]] > 0.0:
+                cells[filled], weights[filled] = j, numbers[0, place[j]]
+                filled, count[a] = filled + 1, count[a] + 1
+            place[j] = -1
+    return count, cells[:filled], weights[:filled]
+
+
+@compiled_inside
+def _sweep(laplacian: Laplacian, places: Places, cloud: Cloud, size: int) -> tuple[int, float]:
+    """Topple all loops of a cloud once; its new size, and the most sand that moved.
+
+    cloud: the place of each loop in it, or -1; its loops; their weights, and sand.
+    """
+    (begin, column, entry, resistance), (place, local, numbers) = laplacian, cloud
+    moved, k = 0.0, 0
+    while k < size:
+        i = local[k]
+        after = max(numbers[0, k] + _OVER * (numbers[1, k] - places[0][i]) / resistance[i], 0.0)
+        step, numbers[0, k] = after - numbers[0, k], after
+        numbers[1, k] -= resistance[i] * step
+        moved = max(moved, abs(step) * resistance[i])
+        for at in range(begin[i], begin[i + 1] if step != 0.0 else begin[i]):
+            j = column[at]
+            if place[j] < 0 and places[1][j] and size < len(local):
+                place[j], local[size], numbers[0, size], numbers[1, size] = size, j, 0.0, 0.0
+                size += 1
+            if place[j] >= 0:
+                numbers[1, place[j]] += entry[at] * step
+        k += 1
+    return size, moved
