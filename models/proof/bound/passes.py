@@ -264,7 +264,8 @@ def _lower_all(out: RaggedLabels, in_alpha: tuple[Floats, Floats], terms: RightM
         if low < high:
             for row in range(first, min(first + 4, rows)):
                 steps = of_steps[rows - 1 - row : of_steps.size - row]
-                copy_to(of_rows[row] if of_rows.shape[0] else steps, left[row - first])
+                costs = of_rows[row] if of_rows.shape[0] else steps
+                copy_to(costs, left[row - first, : costs.size])
             reached = max(reached, lower_rows(targets, left, terms, low, high))
             _put_back_rows(out, first, targets, low)
     return reached
