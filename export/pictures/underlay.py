@@ -64,19 +64,25 @@ def read_underlay(source: str | Path, *, on: Instance) -> Underlay:
     sampled = not path.is_file() and str(source) in SAMPLES
     data = sample_svg(str(source)).encode() if sampled else read_file(path)
     with naming(path):
-        content = parse_drawing(data, path.suffix, DEFAULT_SIZE, view=on.view)
-        drawn = content.covers(Frame(*on.origin, on.pixel_size, *on.mask.shape)).walls
-        near = ndimage.binary_dilation(drawn, np.ones((3, 3), dtype=bool))
-        share = near[tuple(on.stroke_pixels.T)].mean()
-        if share < _SAME:
-            raise InputError(
-                f"the drawing lies elsewhere than the field of {on.name}: {share:.0%} of the stroke pixels "
-                "are on its strokes; give the drawing that its instance was read from, from the same side"
-            )
-    return _underlay_of_ink(content) if isinstance(content, Bitmap) else _underlay_of_curves(content, data)
+        return parse_underlay(data, path.suffix, on=on)
 
 
-def _underlay_of_curves(curves: Curves, data: bytes) -> Underlay:
+def parse_underlay(data: bytes, suffix: str, *, on: Instance) -> Underlay:
+    """The drawing of an instance from the bytes of a file with this suffix, as in `read_underlay`."""
+    content = parse_drawing(data, suffix, DEFAULT_SIZE, view=on.view)
+    drawn = content.covers(Frame(*on.origin, on.pixel_size, *on.mask.shape)).walls
+    near = ndimage.binary_dilation(drawn, np.ones((3, 3), dtype=bool))
+    share = near[tuple(on.stroke_pixels.T)].mean()
+    if share < _SAME:
+        raise InputError(
+            f"the drawing lies elsewhere than the field of {on.name}: {share:.0%} of the stroke pixels "
+            "are on its strokes; give the drawing that its instance was read from, from the same side"
+        )
+    return _underlay_of_ink(content) if isinstance(content, Bitmap) else underlay_of_curves(content, data)
+
+
+def underlay_of_curves(curves: Curves, data: bytes = b"") -> Underlay:
+    """Curves below a field. data: their file, for the size of the page that it declares."""
     low, high = np.reshape(curves.box, (2, 2))
     start, side = np.reshape(curves.page or (0.0, 0.0, 0.0, 0.0), (2, 2))
     low = np.where(low < start - _EDGE * side, low, start)

@@ -53,6 +53,14 @@ class View:
         """Width and height of a pixel of the picture, in the units of the drawing."""
         return self.box[2] / self.width, self.box[3] / self.height
 
+    def around(self, box: Box) -> View:
+        """The pixels of this picture, continued beyond its edges if need be, that cover a box."""
+        start, corner, step = np.array(self.box[:2]), np.array(box[:2]), np.array(self.pixel)
+        low = np.floor((corner - start) / step)
+        count = np.ceil((corner + box[2:] - start) / step) - low
+        (x, y), (wide, high) = (start + low * step).tolist(), (count * step).tolist()
+        return View((x, y, wide, high), int(count[0]), int(count[1]))
+
 
 def grid_box(instance: Instance) -> Box:
     """x, y, width and height of the grid in the units of the drawing."""

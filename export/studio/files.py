@@ -6,6 +6,7 @@ import io
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
@@ -16,13 +17,9 @@ from ...models.instance.file import write_instance
 from ...models.storage import temporary_folder
 from ..bundle.problem_files import write_all
 from ..pictures.draw import draw
-from ..pictures.svg import encode_png
-from ..pictures.underlay import read_underlay
-from ..shading.colours import colour_normals
-from ..shading.raster import view_of_box
-from ..surfaces.files import paint_surface, write_surface
+from ..surfaces.files import NORMALS, SHADED, write_layers, write_surface
 from .document import Document, Stroke
-from .session import compute_field, compute_surface, read_drawn
+from .session import compute_field, compute_surface, read_drawn, underlay_of
 
 _EPOCH: Final = (1980, 1, 1, 0, 0, 0)  # of files in an archive: same drawing, same bytes
 _COLOURS: Final = {"line": "red", "cut": "black"}
@@ -62,23 +59,20 @@ def _stroke_svg(stroke: Stroke, thick: float) -> str:
 
 
 def _write_layers(document: Document, folder: Path, *_: str) -> None:
-    with temporary_folder() as temporary:
-        underlay = _write_drawing(document, temporary)
-        draw(compute_field(document)[1], folder / f"{document.name}.layers.svg", underlay=underlay)
-
-
-def _write_normals(document: Document, folder: Path, *_: str) -> None:
-    solid = compute_surface(document, compute_field(document)[1])
-    with temporary_folder() as temporary:
-        underlay = read_underlay(_write_drawing(document, temporary), on=solid.instance)
-    [picture] = paint_surface(solid, underlay, view_of_box(document.page), colour_normals)
-    (folder / f"{document.name}.normals.png").write_bytes(encode_png(picture))
+    field = compute_field(document)[1]
+    draw(field, folder / f"{document.name}.layers.svg", underlay=underlay_of(document, field.instance))
 
 
 def _write_surface(document: Document, folder: Path, *_: str) -> None:
+    lifted = compute_surface(document, compute_field(document)[1])
+    write_surface(lifted, folder, drawing=underlay_of(document, lifted.instance))
+
+
+def _write_picture(document: Document, folder: Path, *_: str, name: str) -> None:
+    lifted = compute_surface(document, compute_field(document)[1])
     with temporary_folder() as temporary:
-        underlay = _write_drawing(document, temporary)
-        write_surface(compute_surface(document, compute_field(document)[1]), folder, drawing=underlay)
+        write_layers(lifted, temporary, underlay_of(document, lifted.instance))
+        (temporary / name).replace(folder / f"{document.name}.{name}")
 
 
 def _write_solver_files(document: Document, folder: Path, formulation: str, form: str) -> None:
@@ -97,7 +91,8 @@ DOWNLOADS: Final = {
             compute_field(document)[1], folder / f"{document.name}.png", kind="overview"
         ),
     ),
-    "normals": Download("Normal map (PNG)", _write_normals),
+    "normals": Download("Normal map (PNG)", partial(_write_picture, name=NORMALS)),
+    "shaded": Download("Shaded surface (PNG)", partial(_write_picture, name=SHADED)),
     "surface": Download("Surface (OBJ, heights, pictures)", _write_surface),
     "field": Download(
         "Field (NPZ)",

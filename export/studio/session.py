@@ -30,7 +30,10 @@ from ...models.smooth.polyvector import HOLDS, polyvector_field
 from ...models.surface.hints import Hint
 from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
-from .document import SIZES, Document, MaskEdit, Source
+from ..pictures.underlay import Underlay, parse_underlay, underlay_of_curves
+from ..shading.raster import Outline
+from ..surfaces.outline import find_outline
+from .document import SIZES, Document, MaskEdit, Source, digest_of
 
 _Result = TypeVar("_Result")
 
@@ -182,6 +185,7 @@ class _ResultCache(OrderedDict[object, Any]):
 _DRAWINGS: Final = _ResultCache()
 _FIELDS: Final = _ResultCache()
 _SURFACES: Final = _ResultCache()
+_OUTLINES: Final = _ResultCache()
 
 
 def compute_field(document: Document, size: int | None = None) -> tuple[DrawnInstance, CrossField]:
@@ -212,4 +216,23 @@ def compute_surface(document: Document, field: CrossField) -> Surface:
     return _SURFACES.get_or_compute(
         (field.instance.sha256, hints, flip),
         lambda: surface(field, hints, flip=flip, stop=is_stopped),
+    )
+
+
+def underlay_of(document: Document, instance: Instance) -> Underlay:
+    """The drawing below pictures of a document's field and surface, which show its page."""
+    source = document.source
+    drawing = (
+        parse_underlay(source.data, Path(source.name).suffix, on=instance)
+        if source
+        else underlay_of_curves(document.curves())
+    )
+    return replace(drawing, declared=document.page)
+
+
+def compute_outline(document: Document, instance: Instance) -> Outline:
+    """The outline of a document's surface, as in its files. Raises OvertakenError."""
+    return _OUTLINES.get_or_compute(
+        (instance.sha256, digest_of(document.strokes)),
+        lambda: find_outline(instance, underlay_of(document, instance)),
     )

@@ -8,18 +8,22 @@ from typing import Any, Final
 import numpy as np
 
 from ...models.field.field import FAR, CrossField
+from ...models.instance.instance import Instance
 from ...models.processes.child_program import is_stopped
 from ...models.surface.surface import Surface
 from ...models.surface.trust import OFF, UNFIT, right_angle_deviation
 from ..pictures.draw import count_singularities
 from ..pictures.marks import split_runs
 from ..pictures.streamlines import streamlines
-from ..shading.raster import raster, view_of_grid
+from ..shading.raster import View, grid_box, view_of_box
+from ..surfaces.files import raster_surface
 from .document import Document
 from .next_step import find_next_step
-from .session import DrawnInstance, OvertakenError, compute_field, compute_surface
+from .session import DrawnInstance, OvertakenError, compute_field, compute_outline, compute_surface
 
-SIDE: Final = 480  # pixels of the longer side of a shaded picture
+SIDE: Final = 640  # pixels, about, of the longer side of the grid in a shaded picture
+_MOST_SIDE: Final = 8000  # pixels of a page with a small drawing, of which the page gets a part
+_RIM: Final = 2  # pixels of the grid round it that the picture shows: strokes may be wide
 _FINE: Final = 32767  # steps of a part of a normal: 8 bits would show as bands
 _SPACING: Final = 44  # streamlines of one family across the longer side of the grid
 _LEAST: Final = 2  # stroke pixels of a stroke about which there is a doubt
@@ -111,24 +115,25 @@ def lines_step(field: CrossField) -> dict[str, Any]:
 def surface_step(data: bytes, drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     """The data of the surface of a field for the page."""
     document = Document.from_bytes(data)
-    lifted = compute_surface(document, field)
-    return _surface_view(drawn, lifted)
+    return _surface_view(document, drawn, compute_surface(document, field))
 
 
-def _surface_view(drawn: DrawnInstance, lifted: Surface) -> dict[str, Any]:
+def _surface_view(document: Document, drawn: DrawnInstance, lifted: Surface) -> dict[str, Any]:
     instance, field = lifted.instance, lifted.field
-    longer = max(instance.mask.shape)
-    picture = raster(instance, lifted.normals, view_of_grid(instance, max(1, SIDE // longer)))
-    height, width = picture.opacity.shape
+    view = _view_on_page(document, instance)
+    bands = [part for _, part in raster_surface(lifted, compute_outline(document, instance), view)]
+    normals = np.concatenate([part.normals[..., :2] for part in bands])
+    opacity = np.concatenate([part.opacity for part in bands])
     off = right_angle_deviation(field, lifted.heights)
     unfit = off > OFF
     return {
         "stage": "surface",
-        "size": longer,
-        "width": width,
-        "height": height,
-        "normals": encode_array(np.round(_FINE * picture.normals[..., :2]), "i2"),
-        "opacity": encode_array(np.round(255 * picture.opacity), "u1"),
+        "size": max(instance.mask.shape),
+        "box": view.box,
+        "width": view.width,
+        "height": view.height,
+        "normals": encode_array(np.round(_FINE * normals), "i2"),
+        "opacity": encode_array(np.round(255 * opacity), "u1"),
         "confidence": encode_array(np.round(255 * lifted.confidence), "u1"),
         "mask": encode_array(instance.mask, "u1"),
         "rows": instance.mask.shape[0],
@@ -137,3 +142,12 @@ def _surface_view(drawn: DrawnInstance, lifted: Surface) -> dict[str, Any]:
         "freedom": list(lifted.freedom),
         "suspects": _find_suspects(drawn, unfit[instance.stroke_index]) if unfit.mean() > UNFIT / 2 else [],
     }
+
+
+def _view_on_page(document: Document, instance: Instance) -> View:
+    """The pixels of a picture of the page that show the grid."""
+    x, y, width, height = grid_box(instance)
+    rim = _RIM * instance.pixel_size
+    side = round(SIDE * max(document.page[2:]) / max(width, height))
+    page = view_of_box(document.page, max(1, min(side, _MOST_SIDE)))
+    return page.around((x - rim, y - rim, width + 2 * rim, height + 2 * rim))

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Final
 
@@ -28,7 +28,7 @@ from ..pictures.layers import strokes_sheet
 from ..pictures.svg import encode_png, render_sheet
 from ..pictures.underlay import Underlay, read_underlay
 from ..shading.colours import UPPER_LEFT, Lamp, colour_normals, shade_by_light, to_eight_bit
-from ..shading.raster import Box, Raster, View, grid_box, raster, view_of_box
+from ..shading.raster import Box, Outline, Raster, View, grid_box, raster, view_of_box
 from .outline import find_outline
 
 NORMALS: Final = "normals.png"
@@ -169,15 +169,23 @@ def paint_surface(
     """
     outline = find_outline(surface.instance, drawing) if drawing else None
     pictures = [np.zeros((view.height, view.width, 4), dtype=np.uint8) for _ in colours]
-    band = max(1, _BAND // view.width)
-    for top in range(0, view.height, band):
-        rows = slice(top, top + band)
-        part = raster(surface.instance, surface.normals, view, rows, outline)
+    for rows, part in raster_surface(surface, outline, view):
         near = part.depth > -_RIM
         seen = Raster(part.normals[near], part.depth[near])
         for picture, colour in zip(pictures, colours, strict=True):
             picture[rows][near] = to_eight_bit(colour(seen))
     return pictures
+
+
+def raster_surface(surface: Surface, outline: Outline | None, view: View) -> Iterator[tuple[slice, Raster]]:
+    """The picture of a surface in bands: their rows, and their normals and depth.
+
+    outline: from `find_outline` for a surface with a drawing, None for one without.
+    """
+    band = max(1, _BAND // view.width)
+    for top in range(0, view.height, band):
+        rows = slice(top, top + band)
+        yield rows, raster(surface.instance, surface.normals, view, rows, outline)
 
 
 def lay_over(above: NDArray[np.uint8], below: NDArray[np.uint8]) -> NDArray[np.uint8]:

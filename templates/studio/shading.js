@@ -4,12 +4,12 @@ import { colours, drawInk, gridPicture } from "./drawing.js";
 
 const AMBIENT = 0.04, VIEWER = 0.10, LAMP = 0.95, FILL = 0.08, CLAY = [0.80, 0.77, 0.73]; // as export/shading/colours.py
 export const LAMP_AT = { azimuth: 130 * Math.PI / 180, elevation: 38 * Math.PI / 180 };
-const LEVELS = 1024, FINE = 32767, DOUBT = 64; // of 255: angles in space that are 17 degrees and more off
+const LEVELS = 8192, FINE = 32767, DOUBT = 64; // of 255: angles in space that are 17 degrees and more off
 const SCREEN = Uint8ClampedArray.from({ length: LEVELS + 1 }, (_, k) => {
   const light = k / LEVELS;
   return 255 * (light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055);
 });
-const screen = light => SCREEN[Math.max(0, Math.min(LEVELS, light * LEVELS | 0))];
+const screen = light => SCREEN[Math.max(0, Math.min(LEVELS, Math.round(light * LEVELS)))];
 const unit = ([x, y, z]) => { const long = Math.hypot(x, y, z); return [x / long, y / long, z / long]; };
 const direction = ({ azimuth, elevation }) => [Math.cos(elevation) * Math.cos(azimuth), Math.cos(elevation) * Math.sin(azimuth), Math.sin(elevation)];
 
@@ -71,7 +71,7 @@ export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strok
       surface.shown = { key, picture };
     }
     context.imageSmoothingQuality = "high";
-    context.drawImage(surface.shown.picture, frame.x, frame.y, wide, high);
+    context.drawImage(surface.shown.picture, ...surface.box);
     context.globalCompositeOperation = "source-atop"; // only on the surface
     if (doubtful) context.drawImage(doubtMap(surface), frame.x, frame.y, wide, high);
     context.globalCompositeOperation = "source-over";

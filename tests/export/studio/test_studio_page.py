@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import base64
+import io
 import json
 import math
 
+import numpy as np
 import pytest
 from browsing import CONTRAST, find, show, sideways
+from crossfield.export.cli.app import invoke
+from crossfield.export.studio.document import Document
+from crossfield.export.studio.session import hints_on_mask, read_drawn
+from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
 from small_drawings import png
 from studio_pages import BOX, banner, document, drag, load, opened, pebble, press, settled, tool, until, write
@@ -154,6 +161,48 @@ def test_a_picture_lies_under_its_traced_strokes(empty, tmp_path):
     assert not find(settled(browser), "#opacity").is_displayed()
     find(browser, "#undo").click()
     assert find(settled(browser), "#opacity").is_displayed()
+
+
+SHOWN = """
+const draw = CanvasRenderingContext2D.prototype.drawImage;
+CanvasRenderingContext2D.prototype.drawImage = function(image, ...box) {
+  if (this.canvas.id === "surface") window.shown = [image.toDataURL(), box];
+  return draw.call(this, image, ...box);
+};
+"""
+"""Keeps the picture that is painted last on the surface canvas, and its place."""
+
+
+@pytest.mark.parametrize("content", [sample_svg("bottle").encode(), PEBBLE])
+def test_the_preview_is_the_picture_that_shade_writes(empty, tmp_path, content):
+    path = tmp_path / ("drawing.json" if content is PEBBLE else "drawing.svg")
+    browser = load(empty, path, content)
+    slide(browser, "#size", 24)
+    for box in ("#doubtful", "#ink"):
+        find(browser, box).click()
+    browser.execute_script(SHOWN)
+    drag(settled(browser), [(200, 300), (230, 270)], "#surface")
+    if content is PEBBLE:
+        find(browser, "#download-menu summary").click()
+        path = given(browser, tmp_path / "saved", find(browser, "[data-download=drawing]").click)
+    browser.execute_async_script("requestAnimationFrame(() => requestAnimationFrame(arguments[0]))")
+    picture, (left, top, wide, high) = browser.execute_script("return window.shown")
+    shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(picture.split(",")[1])))).astype(int)
+    session = Document.from_json(document(browser))
+    (hint,) = hints_on_mask(session, read_drawn(session).instance)
+    x, y, *sides = session.page
+    units = shown.shape[1] / wide, shown.shape[0] / high
+    angles = [str(round(math.degrees(angle))) for angle in (hint.slant, hint.tilt)]
+    options = ["--size", "24", "--side", str(round(max(np.multiply(sides, units))))]
+    options += ["--hint", ",".join([str(hint.row), str(hint.column), *angles])]
+    assert invoke(["shade", str(path), "-o", str(tmp_path / "out"), *options]) == 0
+    column, row = round((left - x) * units[0]), round((top - y) * units[1])
+    box = (column, row, column + shown.shape[1], row + shown.shape[0])
+    off = np.abs(np.asarray(Image.open(tmp_path / "out" / "shaded.png").crop(box)) - shown)
+    opaque = shown[..., 3] == 255
+    assert opaque.mean() > 0.2
+    assert off[..., 3].max() == 0
+    assert off[opaque].max() <= 1
 
 
 def answer(browser, *, accept):
