@@ -49,6 +49,17 @@ def random_instance(seed, *, grid=False):
     return cf.Instance.on_faces("small", mesh, chosen, *strokes, **more)
 
 
+def fan(faces=5, bend=0.4):
+    """Faces around a vertex, two of them with strokes that no field follows exactly."""
+    around = np.arange(faces) * 2 * np.pi / faces
+    rim = np.c_[np.cos(around), np.sin(around), bend * np.cos(2 * around)]
+    rolled = [np.roll([0, 1 + k, 1 + (k + 1) % faces], k) for k in range(faces)]
+    mesh = cf.Mesh(np.vstack([np.zeros(3), rim]), np.array(rolled, np.int32))
+    return cf.Instance.on_faces(
+        "fan", mesh, np.array([0, 2]), np.array([0.3, 1.2]), np.ones(2), orthogonal=True
+    )
+
+
 def strokeless(mesh, **more):
     """An instance on a mesh without strokes."""
     none = np.zeros(0)

@@ -39,6 +39,7 @@ MOST_WORK = 8  # times as much memory for all levels together, if each had its o
 MOST_RING = 64  # pairs of a ring
 MOST_TABLES = 1 << 22  # of a level: sums of so many 32-bit numbers are exact in 64-bit floats
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
+COLUMNS = 64  # of an inverse, at once
 MOST_STAGES = 64  # of charges
 BLOCK = 1 << 19  # of links from their clouds at once
 MOST_CASES = 256  # of integers after the last level
@@ -139,8 +140,7 @@ def memory_of_instance(arrays: dict[str, Array]) -> int:
     """Bytes that the check takes at most without levels; more than was measured."""
     mask = arrays.get("instance_mask", np.zeros(0, bool))
     size = len(arrays["instance_faces"]) if "instance_faces" in arrays else int(mask.sum())
-    dense = 36 * size * size if size <= MOST_DENSE else 0
-    return int(24 * mask.size + 1500 * size + dense + 8 * sum(array.nbytes for array in arrays.values()))
+    return int(24 * mask.size + 1500 * size + 8 * sum(array.nbytes for array in arrays.values()))
 
 
 def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, Array, Array]:
@@ -200,22 +200,88 @@ def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring
 
 
 def limits_of(rows: CentredRows) -> Array:
-    """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,)."""
-    n, first, second = rows.size, rows.first, rows.second
-    if n > MOST_DENSE:
-        return np.full(len(first), QUARTER + RELATIVE)
+    """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,).
+
+    Any potential gives a lower bound of a resistance. Here it is a difference of two columns of an inverse.
+    """
+    count = len(rows.first)
+    if rows.size > MOST_DENSE:
+        return np.full(count, QUARTER + RELATIVE)
     weight = rows.weight / max(rows.weight.max(initial=0.0), 1e-300)  # the limits do not depend on the unit
-    matrix = np.zeros((n + 1, n + 1))
-    np.add.at(matrix, (first, second), weight)
-    degree = (matrix := matrix + matrix.T).sum(axis=1)
-    matrix = np.diag(degree + 1e-9 * max(degree.max(), 1.0)) - matrix
-    inverse = np.pad(np.linalg.inv(matrix[:n, :n]), (0, 1))
-    share = np.zeros(len(first))  # weight times resistance
-    for e, (i, j) in enumerate(rows.ends):  # any potential gives a lower bound of the resistance
-        potential = inverse[i] - inverse[j]
-        drop = potential[first] - potential[second]
-        share[e] = weight[e] * drop[e] ** 2 / max(weight @ (drop * drop), 1e-300)
+    place, start = blocks_of(rows.size, rows.first[: rows.pairs], rows.second[: rows.pairs])
+    room = 96 * rows.size * int(np.diff(start).max()) + 64 * COLUMNS * count
+    base.check_room(rows.taken + room, rows.memory)
+    ends = np.sort([place[rows.first], place[rows.second]], axis=0)
+    block = np.searchsorted(start, ends[0], side="right") - 1
+    order = np.argsort(block, kind="stable")
+    edges = np.split(order, np.searchsorted(block[order], np.arange(1, len(start) - 1)))
+    share = np.zeros(count)  # weight times resistance
+    for number, columns in inverse_columns(start, ends, weight, edges):
+        for at in range(0, len(edges[number]), COLUMNS):
+            some = edges[number][at : at + COLUMNS]
+            one, other = np.minimum(ends[:, some] - start[number], columns.shape[1] - 1)
+            potential = columns[:, one] - columns[:, other]
+            drop = potential[ends[0]] - potential[ends[1]]
+            power = np.maximum(weight @ (drop * drop), 1e-300)
+            share[some] = weight[some] * drop[some, np.arange(len(some))] ** 2 / power
     return QUARTER * np.clip(1 - share * (1 - RELATIVE), 0.0, 1.0) + RELATIVE
+
+
+def inverse_columns(
+    start: Array, ends: Array, weight: Array, edges: list[Array]
+) -> Iterator[tuple[int, Array]]:
+    """The inverse of the matrix of weights: numbers of blocks, and their columns, the next block's and zeros.
+
+    ends (2, r): places of points, ascending. edges: the rows whose first end is in a block. Last blocks come
+    first. The columns have a row of zeros for the ground.
+    """
+    n, size, solved, carry = int(start[-1]), np.diff(start), list[tuple[Array, Array]](), np.zeros(1)
+    degree = np.bincount(ends.ravel(), np.append(weight, weight), n + 1)[:n]
+    degree = degree + 1e-9 * max(degree.max(), 1.0)
+    for number, some in enumerate(edges):
+        here, inner = slice(start[number], start[number + 1]), some[ends[1, some] < n]
+        links = np.zeros((size[number], size[number : number + 2].sum()))
+        np.add.at(links, tuple(ends[:, inner] - start[number]), weight[inner])
+        within, across = links[:, : size[number]], links[:, size[number] :]
+        inverse = np.linalg.inv(np.diag(degree[here]) - within - within.T - carry)
+        solved.append((inverse, inverse @ across))
+        carry = across.T @ solved[-1][1]
+    line, after = np.zeros((0, 0)), np.zeros((n + 1, 0))  # entries from the diagonal on; the next columns
+    for number in reversed(range(len(size))):
+        inverse, across = solved[number]
+        right = across @ line
+        line = np.hstack([inverse + right[:, : across.shape[1]] @ across.T, right])
+        parts = [line.T]
+        for _, across in reversed(solved[:number]):
+            parts.insert(0, across @ parts[0][: across.shape[1]])
+        columns = np.vstack([*parts, np.zeros((1, size[number]))])
+        yield number, np.hstack([columns, after, np.zeros((n + 1, 1))])
+        after = columns
+
+
+def blocks_of(count: int, first: Array, second: Array) -> tuple[Array, Array]:
+    """Places of points and ground, (n + 1,), and where blocks of places begin.
+
+    Rows join only points of one block, or of successive ones. first, second (m,): their points.
+    """
+    part, points = base.parts_of(count, first, second), np.arange(count)
+    order = np.lexsort((depths_of(part == points, first, second), part))
+    far = np.isin(points, order[np.append(np.diff(part[order]) > 0, True)])  # the last point of each part
+    _, layer = np.unique(part * count + depths_of(far, first, second), return_inverse=True)
+    _, block = np.unique(starts_of(np.bincount(layer))[:-1] // COLUMNS, return_inverse=True)
+    order = np.argsort(block[layer], kind="stable")
+    return np.append(np.argsort(order), count), starts_of(np.bincount(block[layer]))
+
+
+def depths_of(start: Array, first: Array, second: Array) -> Array:
+    """How many pairs lead from each point to the nearest one where `start` is true, (n,)."""
+    depth, here = np.where(start, 0, -1), 0
+    while (depth == here).any():
+        for one, other in ((first, second), (second, first)):
+            near = other[depth[one] == here]
+            depth[near[depth[near] < 0]] = here + 1
+        here += 1
+    return depth
 
 
 # Section 2: labels, cells and costs ------------------------------------------------------------------------

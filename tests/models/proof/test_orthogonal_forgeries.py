@@ -12,7 +12,7 @@ from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError
 from meshes import torus
 from orthogonal_certificates import certificate_at, shares_of_star, star
-from small_meshes import strokeless, try_all_integers
+from small_meshes import fan, strokeless, try_all_integers
 
 HALF = np.pi / 2
 BOTH = ([1, 1], [1, -1])  # one pair, there and back
@@ -31,17 +31,6 @@ def local_optima(instance):
     near = [best + np.array(step) for step in itertools.product((-1, 0, 1), repeat=len(best))]
     worse = min((z for z in near if energy.least_total(z) > least + 1e-6), key=energy.least_total)
     return least, best, energy.least_total(worse), worse
-
-
-def fan(faces=5, bend=0.4):
-    """Faces around a vertex, two of them with strokes that no field follows exactly."""
-    around = np.arange(faces) * 2 * np.pi / faces
-    rim = np.c_[np.cos(around), np.sin(around), bend * np.cos(2 * around)]
-    rolled = [np.roll([0, 1 + k, 1 + (k + 1) % faces], k) for k in range(faces)]
-    mesh = cf.Mesh(np.vstack([np.zeros(3), rim]), np.array(rolled, np.int32))
-    return cf.Instance.on_faces(
-        "fan", mesh, np.array([0, 2]), np.array([0.3, 1.2]), np.ones(2), orthogonal=True
-    )
 
 
 def test_a_ring_along_one_pair_there_and_back_is_refused():
