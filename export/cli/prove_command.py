@@ -108,7 +108,7 @@ def _write_proof(
     proven, bounds = _proven_facts(proof, certificate)
     document = proven | {
         "describes": names.field if certificate is None else names.certificate,
-        "reason": None if failure is None else str(failure),
+        "reason": proof.reason or None if failure is None else str(failure),
         "seconds": proof.seconds,
         "ended": proof.ended,
         "levels": [

@@ -20,6 +20,7 @@ from ...instance.angles import HALF
 from ...instance.domain import Bools, Domain, Floats
 from ...instance.sparse_systems import factor_matrix
 from ...processes.compilation import compiled, compiled_inside
+from ...processes.deadline import IsOver
 from ..checkers.check_orthogonal import (
     MOST_STAGES,
     RELATIVE,
@@ -39,6 +40,7 @@ Cloud = tuple[Indices, Indices, Floats]
 
 _MOST_CELLS: Final = 400  # of a cloud
 _MOST_ENTRIES: Final = 8_000_000  # of all clouds
+_CHUNK: Final = 1000  # clouds between looks at the clock
 _SWEEPS: Final = 400  # in which sand topples
 _OVER: Final = 1.5  # relaxation
 _STILL: Final = 1e-7  # excess of sand, in particles, that topples no more
@@ -50,10 +52,12 @@ _HALVINGS: Final = 60  # of the range of a multiplier
 _GAIN: Final = 1e-4  # relative: by which another round, or stage, has to raise the bound
 
 
-def charge_arrays(domain: Domain, rows: CentredRows, threshold: float, is_over: Callable[[], bool]) -> Arrays:
-    """The arrays of charges in a certificate; none without rings.
+def charge_arrays(
+    domain: Domain, rows: CentredRows, threshold: float, is_over: IsOver, *, quick: bool = False
+) -> Arrays:
+    """The arrays of charges in a certificate; none without rings, or without the time for a first round.
 
-    threshold: as of `Proof`. is_over: whether the work has to end.
+    threshold: as of `Proof`. quick: whether to end after this round.
     """
     arrays = _ring_loops(domain, rows) if len(domain.rings.defect) else {}
     if not arrays or len(arrays["loop_start"]) == 1:
@@ -63,16 +67,16 @@ def charge_arrays(domain: Domain, rows: CentredRows, threshold: float, is_over: 
         return {}
     remaining, stages = charges.most, _Stages(charges)
     for number in range(MOST_STAGES):
-        stage, bound, after = stages.stage(remaining, threshold, is_over)
-        if number and bound < best + _GAIN * threshold:
+        stage, bound, after = stages.stage(remaining, threshold, is_over, 1 if quick else _ROUNDS)
+        if not stage or (number and bound < best + _GAIN * threshold):
             break
         arrays |= {f"stage_{number}_{part}": array for part, array in stage.items()}
         arrays["stages"] = np.array([number + 1], np.int32)
         best = max(best, bound)
-        if is_over() or bound >= threshold or (after == remaining).all():
+        if quick or is_over() or bound >= threshold or (after == remaining).all():
             break
         remaining = after
-    return arrays
+    return arrays if "stages" in arrays else {}
 
 
 def _ring_loops(domain: Domain, rows: CentredRows) -> Arrays:
@@ -105,26 +109,33 @@ class _Stages:
         self.inverse = factor_matrix(self.laplacian, pull=1e-9 * float(charges.resistance.max()))
 
     def stage(
-        self, most: Indices, threshold: float, is_over: Callable[[], bool]
+        self, most: Indices, threshold: float, is_over: IsOver, rounds: int
     ) -> tuple[Arrays, float, Indices]:
-        """The arrays of a stage with these particles, its bound, and the particles that it leaves."""
+        """The arrays of a stage with these particles, its bound, and the particles that it leaves.
+
+        There are no arrays where time is over before the first round is complete.
+        """
         charges, best, potential = self.charges, -np.inf, np.zeros(self.charges.size)
         places, shares = self._places(most), np.zeros(int(most.sum()))
-        for _ in range(_ROUNDS):
-            start, cell, weight = self._spread(most, places, charges.origin + self.laplacian @ potential)
+        arrays, bound, remaining = Arrays(), best, most
+        for _ in range(rounds):
+            background = charges.origin + self.laplacian @ potential
+            if (spread := self._spread(most, places, background, is_over)) is None:
+                break
+            start, cell, weight = spread
             clouds = Clouds(charges, most, start, cell, weight)
             _, added, kind = stage_of(charges, clouds, potential, np.zeros(charges.size))
             price = self._best_price(clouds, added, kind)
             bound, added, kind = stage_of(charges, clouds, potential, price)
             if bound > best:
-                parts = *most, potential, price, start, cell, weight
+                parts = zip(STAGE_PARTS.items(), (*most, potential, price, start, cell, weight), strict=True)
+                arrays = {name: array.astype(kind) for (name, kind), array in parts}
                 remaining = clouds.remaining(bound, added, kind, threshold)
             if bound < best + _GAIN * threshold or is_over():
                 break
             best = bound
             shares, potential = self._better_potential(clouds, kind, shares, is_over)
-        kinds = zip(STAGE_PARTS.items(), parts, strict=True)
-        return {name: array.astype(kind) for (name, kind), array in kinds}, max(best, bound), remaining
+        return arrays, max(best, bound), remaining
 
     def _potential_of(self, numbers: Floats) -> Floats:
         """The potential of charges, less their means in parts where they add up to 0."""
@@ -147,19 +158,22 @@ class _Stages:
         return np.array([positive, negative]) & home, home
 
     def _spread(
-        self, most: Indices, places: tuple[Bools, Bools], background: Floats
-    ) -> tuple[Indices, Indices, Floats]:
-        """The clouds of all particles that fill the background best: starts, loops and weights."""
+        self, most: Indices, places: tuple[Bools, Bools], background: Floats, is_over: IsOver
+    ) -> tuple[Indices, Indices, Floats] | None:
+        """The clouds of all particles that fill the background best: starts, loops and weights.
+
+        None where time is over before.
+        """
         charges, parts = self.charges, list[tuple[Indices, Indices, Floats]]()
         for side, sign in enumerate((1, -1)):
             loop = np.nonzero(most[side])[0]
             cells = max(min(_MOST_CELLS, _MOST_ENTRIES // max(len(loop), 1)), 1)
-            parts.append(
-                _topple(
-                    (charges.begin, charges.column, charges.entry, charges.resistance),
-                    (np.maximum(sign * background, _LEAST), *(place[side] for place in places)), loop, cells,
-                )
-            )  # fmt: skip
+            room = np.maximum(sign * background, _LEAST), *(place[side] for place in places)
+            for at in range(0, max(len(loop), 1), _CHUNK):
+                if is_over():
+                    return None
+                laplacian = charges.begin, charges.column, charges.entry, charges.resistance
+                parts.append(_topple(laplacian, room, loop[at : at + _CHUNK], cells))
         count, cell, weight = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
         return starts_of(count), cell, weight.astype(np.float32).astype(float)
 
@@ -184,7 +198,7 @@ class _Stages:
         return np.where(self.whole, low, 0.0)
 
     def _better_potential(
-        self, clouds: Clouds, kind: Indices, shares: Floats, is_over: Callable[[], bool]
+        self, clouds: Clouds, kind: Indices, shares: Floats, is_over: IsOver
     ) -> tuple[Floats, Floats]:
         """Minimum-energy shares of particles in [0, 1], for given clouds, and their potential.
 

@@ -24,7 +24,7 @@ from ...instance.domain import Bools, Domain, Floats, Ints
 from ...instance.file import instance_arrays
 from ...instance.instance import Instance
 from ...orthogonal.energy import OrthogonalEnergy, field_of
-from ...processes.deadline import Progress
+from ...processes.deadline import Progress, never
 from ...search.integer_fields import starting_integers
 from ...search.integer_search import IntegerSearch
 from ..bound.charges import charge_arrays
@@ -54,7 +54,9 @@ _TINY: Final = 1e-3  # relative gap below which finer labels follow
 _MOST_OF: Final = 0.9  # of what rings cost: those with the rest come into use later, unless the gap is loose
 _MANY: Final = 0.1  # share of new rings above which they may come into use at the same spacing
 _LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one, and no chain follows a search
+_STARTS: Final = 0.3  # of the time, after which no start is rounded with care
 _CHARGES: Final = 0.5  # of the time, which charges leave
+_LOOK: Final = 1e-4  # seconds per point of a first look at charges, and of its check, where points are many
 _WIDE: Final = 0.01  # relative gap after which a search follows, from the second spacing on
 _SEARCH: Final = 0.25  # share of the time left that it takes at most
 _ROUNDS: Final = 10  # of a search without a limit of time
@@ -72,7 +74,8 @@ def prove_orthogonal(
     """
     began = time.monotonic()
     energy = OrthogonalEnergy.of(instance)
-    starts = starting_integers(instance, energy, start, ends.is_over)
+    soon = ends.deadline.share(_STARTS)
+    starts = starting_integers(instance, energy, start, lambda: soon.passed() or ends.is_over())
     prover = _Prover(instance, energy, starts, ends, progress, seed)
     return prover.proof(prover.run(), began), prover.limit
 
@@ -105,9 +108,9 @@ class _Prover:
     """The best field, and the chain that proves most. z: integers of the field; least: its energy.
 
     starts: integers to begin with. arrays: of all certificates. rows: without a centre. charges, of_charges:
-    their bound, and their arrays; charged: the energy of the field for which they were found. limit: of Lemma
-    1. hunt: the search for better integers. searched: its seconds. took: seconds of the last chain. reason:
-    why no level is begun.
+    their bound, and their arrays; charged: the energy of the field for which they were found. look: seconds
+    of the last ones. limit: of Lemma 1. hunt: the search for better integers. searched: its seconds. took:
+    seconds of the last chain. reason: what is left out.
     """
 
     instance: Instance
@@ -122,6 +125,7 @@ class _Prover:
     charges: float = 0.0
     of_charges: Arrays = field(default_factory=dict)
     charged: float = math.inf
+    look: float = 0.0
     limit: Floats | None = None
     hunt: IntegerSearch | None = None
     searched: float = 0.0
@@ -135,8 +139,8 @@ class _Prover:
     def _prepare(self) -> CentredRows:
         """Compute what all levels share; the rows without a centre."""
         domain, arrays = self.instance.domain, instance_arrays(self.instance).items()
-        length = np.diff(domain.rings.start)
-        rings = domain.rings.keep((length >= 3) & (length <= checker.MOST_RING))
+        length, fits = np.diff(domain.rings.start), self._coarsest_costs() <= _MOST_COSTS
+        rings = domain.rings.keep((length >= 3) & (length <= checker.MOST_RING) & fits)
         self.arrays = {INSTANCE + name: array for name, array in arrays}
         self.arrays |= {"kappa": domain.kappa} if domain.kappa is not None else {}
         self.arrays |= {"ring_start": rings.start, "ring_pair": rings.pair}
@@ -144,7 +148,7 @@ class _Prover:
         self.arrays["half"] = np.zeros(domain.size, np.uint8)
         rows, links = checker.CentredRows(self.arrays), self.energy.links
         self.order = reverse_cuthill_mckee(links + links.T, symmetric_mode=True).astype(np.int64)
-        if self._coarsest_costs() <= _MOST_COSTS:  # otherwise no level follows, and this takes long
+        if fits:  # otherwise no level follows, and this takes long
             self.arrays["half"] = two_colours(domain, rows.fixed[:-1])
         self.limit = rows.limit
         return rows
@@ -154,22 +158,32 @@ class _Prover:
 
         It is due at the beginning and for each better field, because that excludes more.
         """
-        rows, deadline, quick = self.rows or self._prepare(), self.ends.deadline, self.rows is None
-        self.rows, later = rows, _CHARGES * deadline.left() if math.isfinite(deadline.left()) else 0.0
-        while rows.fixed[:-1].any() and self.least < self.charged:
-            begin = deadline.clock()
-            chain, centred = self._begin_chain()
-            took, over = deadline.clock() - begin, lambda: self.ends.is_over(max(later, self.proven.seconds))
-            is_over = (lambda: True) if quick else over  # one look shows whether a search pays first
-            arrays = charge_arrays(self.instance.domain, centred, chain.threshold, is_over)
-            begin = deadline.clock()
-            bound = checker.charges_bound(arrays, centred, chain.threshold)
+        ends, quick, many = self.ends, self.rows is None, self.instance.domain.size > checker.MOST_DENSE
+        free, expected = len(self.energy.pins) > 0, _LOOK * self.instance.domain.size
+        if quick and many and free and ends.is_over(expected):
+            self._leave_out(f"charges take about {expected:.0f} s, which needs a longer time limit")
+            free = False
+        if quick and not free and self._reason_against_levels():
+            return ""
+        self.rows, clock = self.rows or self._prepare(), ends.deadline.clock
+        later = _CHARGES * ends.deadline.left() if math.isfinite(ends.deadline.left()) else 0.0
+        while free and self.least < self.charged and (quick or not ends.is_over(later + self.look)):
+            begin = clock()
+            chain, rows = self._begin_chain()
+            took = clock() - begin
+            ahead = took if quick else max(later, self.proven.seconds)
+            is_over = (lambda: ends.is_over(ahead)) if many or not quick else never  # noqa: B023
+            # One look shows whether a search pays first.
+            arrays = charge_arrays(self.instance.domain, rows, chain.threshold, is_over, quick=quick)
+            checking = clock()
+            bound = checker.charges_bound(arrays, rows, chain.threshold)
             self.charged = math.inf if quick else self.least
+            self.look = clock() - begin
             if bound > self.charges:
                 before = chain.arrays.keys() - self.of_charges.keys()
                 chain.arrays = {name: chain.arrays[name] for name in sorted(before)} | arrays
                 self.charges, self.of_charges, chain.convex = bound, arrays, bound
-                chain.seconds = took + deadline.clock() - begin
+                chain.seconds = took + clock() - checking
                 self.proven = max(chain, self.proven, key=lambda chain: chain.bound)
                 self.progress(f"energy {self.least:.5g}, bound {bound:.5g}, charges")
             if self.charges > 0 and (reason := self._reason_to_end(self.proven)):
@@ -179,6 +193,10 @@ class _Prover:
             quick = False
         return ""
 
+    def _leave_out(self, what: str) -> None:
+        """Add to the reason what is left out."""
+        self.reason = "; ".join(dict.fromkeys(filter(None, [*self.reason.split("; "), what])))
+
     def proof(self, ended: str, began: float) -> Proof:
         """The proof so far, not checked."""
         best, chain = field_of(self.instance, self.z, self.energy), self.proven
@@ -186,7 +204,7 @@ class _Prover:
         return Proof(
             field=best, energy=energy, bound=min(chain.bound, energy), forced=chain.forced, levels=levels,
             seconds=time.monotonic() - began, ended=ended, arrays=chain.arrays, threshold=chain.threshold,
-            reason="" if chain.bound else self.reason,
+            reason=self.reason,
         )  # fmt: skip
 
     def run(self) -> str:
@@ -215,12 +233,13 @@ class _Prover:
         reason, small = self.ends.reason(), self.instance.domain.size <= checker.MOST_DENSE
         costs = self._coarsest_costs()
         if costs > _MOST_COSTS:
-            self.reason = (
-                f"the coarsest level has {costs} pairs of labels; at most {_MOST_COSTS} fit in memory"
+            self._leave_out(
+                f"the coarsest level has {costs} pairs of labels, and at most {_MOST_COSTS} fit in memory"
             )
             return reason or "labels"
-        if not small and not reason and self.ends.is_over(_SECONDS * costs):
-            self.reason = f"the coarsest level takes about {_SECONDS * costs:.0f} s; increase the time limit"
+        if not small and reason in ("", "time") and self.ends.is_over(_SECONDS * costs):
+            seconds = f"{_SECONDS * costs:.0f} s"
+            self._leave_out(f"the coarsest level takes about {seconds}, which needs a longer time limit")
             return "time"
         return "" if reason == "time" and small and not self.proven.bound else reason
 

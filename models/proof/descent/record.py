@@ -130,7 +130,8 @@ class Proof(Claim):
     threshold
         The energy for which the levels of orthogonal crosses were pruned.
     reason
-        Why nothing is proven, where `ended` does not state it; empty otherwise.
+        What is left out for lack of time or memory, or why nothing is proven, where `ended` does not state
+        it; empty otherwise.
 
     """
 

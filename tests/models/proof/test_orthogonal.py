@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from types import SimpleNamespace
 
 import crossfield as cf
@@ -14,12 +15,15 @@ from crossfield.models.processes.deadline import Deadline, never, silent
 from crossfield.models.proof.certificate import check_proof
 from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError
+from crossfield.models.proof.descent import orthogonal
 from crossfield.models.proof.descent.descent import Termination
 from crossfield.models.proof.descent.orthogonal import prove_orthogonal
 from instance_kinds import apart
 from meshes import torus
+from orthogonal_certificates import certificate_at
 from small_meshes import (
     beyond_forest,
+    fan,
     keeps_optimum,
     least_of_charges,
     prove_from,
@@ -89,6 +93,27 @@ def test_charges_alone_may_meet_the_gap():
     assert checker.check_arrays(proof.certificate()).bound == proof.bound > 0.95 * proof.energy
 
 
+@pytest.mark.parametrize("kind", ["parts", "grid", "weights"])
+def test_limits_follow_from_the_resistances_of_the_pseudoinverse(kind):
+    mesh = apart(random_hull(1, 150), random_hull(2, 60, (1, 1, 3)))
+    instance = strokeless(mesh)
+    if kind == "grid":
+        mask = np.random.default_rng(0).random((17, 17)) < 0.8
+        instance = cf.Instance.on_pixels(
+            "holes", mask, np.argwhere(mask)[:2], *np.ones((2, 2)), orthogonal=True
+        )
+    if kind == "weights":
+        instance = strokeless(mesh, pair_weights=np.random.default_rng(0).uniform(0.1, 5, len(mesh.first)))
+    energy = OrthogonalEnergy.of(instance)
+    rows = np.zeros((len(energy.first), energy.size + 1))
+    rows[np.arange(len(rows)), energy.first] = 1
+    rows[np.arange(len(rows)), energy.second] -= 1
+    inverse = np.linalg.pinv(rows.T * energy.weight @ rows, rcond=1e-9, hermitian=True)
+    across = np.einsum("ei,ij,ej->e", rows, inverse, rows)
+    limit = checker.CentredRows(certificate_at(instance, np.zeros(len(rows), int))).limit
+    assert limit == pytest.approx(np.pi / 4 * (1 - energy.weight * across), abs=1e-7)
+
+
 @pytest.mark.parametrize("seed", [2, 7, 40])
 def test_all_levels_keep_the_crosses_of_the_optimum(seed):
     instance = random_instance(seed)
@@ -108,24 +133,25 @@ def test_a_single_pair_of_labels_is_kept_with_its_square():
     assert sorted(corners[:, 1, 2].tolist()) == [4 * x + y for x in (1, 2) for y in (2, 3)]
 
 
-def fan(turn=0.0, *, shift=0):
-    """A vertex with eight faces around it, bent like a saddle, whose boundary is stroked; frames may turn."""
-    around = np.arange(8) * np.pi / 4
-    rim = np.c_[np.cos(around), np.sin(around), 0.4 * np.cos(2 * around)]
-    c, s = math.cos(turn), math.sin(turn)
-    vertices = np.vstack([np.zeros(3), rim]) @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    faces = np.array([np.roll([0, 1 + k, 1 + (k + 1) % 8], shift) for k in range(8)], dtype=np.int32)
-    mesh = cf.Mesh(vertices, faces)
-    begin, end = mesh.vertices[1 + np.arange(8)], mesh.vertices[1 + (np.arange(8) + 1) % 8]
-    theta = mesh.angle_in(np.arange(8, dtype=np.int32), end - begin)
-    return cf.Instance.on_faces("fan", mesh, np.arange(8), theta, np.ones(8), stroke_coefficient=2.0)
-
-
 def test_the_shortest_time_limit_leaves_a_bound_that_is_checked(tmp_path):
     proof = cf.prove(cf.sample("disc"), limits=cf.Limits(1e-9, gap=0.0))
     assert (proof.ended, len(proof.levels)) == ("time", 1)
     assert 0 < cf.write_certificate(proof, tmp_path / "disc.npz").bound == proof.bound
     assert cf.read_certificate(tmp_path / "disc.npz").bound == proof.bound
+
+
+def test_without_time_for_charges_and_levels_many_faces_have_a_field_and_the_reason():
+    proof = cf.prove(strokeless(random_hull(0, 3100)), limits=cf.Limits(1e-9))
+    assert (proof.ended, proof.levels, proof.has_bound) == ("time", (), False)
+    assert re.fullmatch("charges take about 1 s.*; the coarsest level takes about 5 s.*", proof.reason)
+
+
+def test_a_bound_of_charges_has_the_reason_why_no_level_follows(monkeypatch):
+    monkeypatch.setattr(orthogonal, "_MOST_COSTS", 1000)
+    ticks = []
+    proof = cf.prove(strokeless(torus(12, 6)), progress=ticks.append, stop=lambda: len(ticks) > 3)
+    assert 0 < proof.bound < proof.energy
+    assert proof.reason.startswith("the coarsest level has")
 
 
 @pytest.mark.slow
@@ -142,7 +168,7 @@ def test_levels_end_while_there_is_time_for_their_check(monkeypatch):
 @pytest.fixture(scope="module")
 def forgeable():
     """Certificates of a best field, with rings, and of a worse one, each with the optimum."""
-    instance = fan()
+    instance = fan(8)
     proof = cf.prove(instance)
     z = integers_of(proof.field)
     for pair in range(8):
