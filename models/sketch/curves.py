@@ -13,6 +13,8 @@ from ..input_limits import MAX_SEGMENTS
 from ..instance.domain import Bools, Floats, Ints
 from .cover import Box, Covers, Frame, cover_by_segments
 
+STRAIGHT: Final = 0.99
+"""Least chord of a straight line as a share of its length."""
 _FLATNESS: Final = 0.02  # of a pixel
 _BOX_TOLERANCE: Final = 1e-4  # of the longer side: far below a pixel of any grid that can be solved
 
@@ -27,6 +29,7 @@ class Curves:
     page: x, y, width and height of the page, or None if the file does not state it.
     chosen: bool (k,), True where a stroke was chosen as a curvature line, or None without a choice.
     notes: what was left out or changed while reading, one line each.
+    faint: bool (k,), True where a line is much paler or thinner than the others, or None if no line is.
     """
 
     points: Floats
@@ -35,6 +38,7 @@ class Curves:
     page: Box | None
     chosen: Bools | None = None
     notes: tuple[str, ...] = ()
+    faint: Bools | None = None
 
     @property
     def line(self) -> Bools:

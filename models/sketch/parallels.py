@@ -1,7 +1,7 @@
-"""Straight parallels in a drawing that are hatching or ruled paper rather than edges.
+"""Lines of a drawing that are no edges: hatching, ruled paper, and faint construction lines.
 
-Only strokes that would cut the field can be either: parallels among curvature lines, such as the rulings of a
-cylinder, stay.
+Only strokes that would cut the field can be hatching or ruled paper: parallels among curvature lines, such as
+the rulings of a cylinder, stay.
 """
 
 from __future__ import annotations
@@ -12,19 +12,22 @@ from typing import Final
 import numpy as np
 
 from ..instance.angles import vector_length
-from ..instance.domain import Bools
-from .curves import Curves
+from ..instance.domain import Bools, Floats
+from .cover import Frame, Indices
+from .curves import STRAIGHT, Curves
+from .outline import drop_narrow_parts
 
 MANY: Final = 8  # least lines of a family
 _CLOSE: Final = 0.03  # greatest spacing of a hatching as a share of the drawing's longer side
 _LONG: Final = 0.5  # least length of ruled lines, likewise
 _BESIDE: Final = 0.5  # greatest shift along a neighbour, as a share of the shorter one
-_STRAIGHT: Final = 0.99  # least chord of a straight line as a share of its length
+_SAMPLES: Final = 36  # places along a line that are inside or outside of the outline
+_BEYOND: Final = 2  # of these at each end: least part of a line that leaves the outline on both sides
 _BIN: Final = np.radians(2.0)  # of directions; a family takes three neighbouring ones
 
 
 def leave_out_parallels(curves: Curves) -> Curves:
-    """The curves without hatching and ruled paper, and notes on both."""
+    """The curves without hatching, ruled paper and faint lines, and notes on these."""
     is_parallel, notes = find_parallels(curves)
     kept = ~is_parallel
     return replace(
@@ -34,17 +37,14 @@ def leave_out_parallels(curves: Curves) -> Curves:
         red=curves.red[kept],
         chosen=None if curves.chosen is None else curves.chosen[kept],
         notes=(*curves.notes, *notes),
+        faint=None,
     )
 
 
 def find_parallels(curves: Curves) -> tuple[Bools, tuple[str, ...]]:
-    """Which parts of curves (k,) are hatching or ruled paper, and a note on each family of them."""
-    first = np.flatnonzero(np.diff(curves.curve, prepend=-1))
-    last = np.append(first[1:], len(curves.curve)) - 1
-    legs = vector_length(*np.moveaxis(np.diff(curves.points, axis=1), -1, 0)).sum(axis=1)
-    start, way = curves.points[first, 0], curves.points[last, 3] - curves.points[first, 0]
+    """Which parts of curves (k,) are hatching, ruled paper or faint, and notes on them."""
+    first, last, start, way, is_straight = _find_chords(curves)
     chord = vector_length(*way.T)
-    is_straight = (chord >= _STRAIGHT * np.add.reduceat(legs, first)) & (chord > 0)
     is_cut = is_straight & ~curves.line[first]
     bins = round(np.pi / _BIN)
     direction = np.round(np.arctan2(way[:, 1], way[:, 0]) / _BIN).astype(int) % bins
@@ -78,4 +78,42 @@ def find_parallels(curves: Curves) -> tuple[Bools, tuple[str, ...]]:
                 f"{len(members)} parallel lines round ({x:.4g}, {y:.4g}) are left out as hatching or ruled "
                 "paper; if they are curvature lines, mark them as such (in commands: --curvature)"
             )
+    if curves.faint is not None and (is_faint := curves.faint[first] & ~is_parallel).any():
+        x, y = curves.points[(first + last)[is_faint][0] // 2, 0]
+        count = f"{is_faint.sum()} lines are" if is_faint.sum() > 1 else "1 line is"
+        notes.append(
+            f"{count} much paler or thinner than the others and left out as construction lines, first round "
+            f"({x:.4g}, {y:.4g}); if they belong to the object, draw them as strong as the others"
+        )
+        is_parallel |= is_faint
     return np.repeat(is_parallel, last + 1 - first), tuple(notes)
+
+
+def _find_chords(curves: Curves) -> tuple[Indices, Indices, Floats, Floats, Bools]:
+    """First and last part of each curve, its start and the way to its end (n, 2), and which are straight."""
+    first = np.flatnonzero(np.diff(curves.curve, prepend=-1))
+    last = np.append(first[1:], len(curves.curve)) - 1
+    legs = vector_length(*np.moveaxis(np.diff(curves.points, axis=1), -1, 0)).sum(axis=1)
+    start, way = curves.points[first, 0], curves.points[last, 3] - curves.points[first, 0]
+    chord = vector_length(*way.T)
+    return first, last, start, way, (chord >= STRAIGHT * np.add.reduceat(legs, first)) & (chord > 0)
+
+
+def describe_lines_across(curves: Curves, region: Bools, frame: Frame) -> str | None:
+    """Straight lines that leave a region [height, width] on both sides, unless others are curvature lines."""
+    first, _, start, way, is_straight = _find_chords(curves)
+    share = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
+    at = (start[:, None] + share[:, None] * way[:, None] - (frame.x, frame.y)) / frame.pixel
+    column, row = np.moveaxis(np.floor(at).astype(int).clip(-1, max(frame.shape)), -1, 0)
+    around = np.pad(drop_narrow_parts(region, 3), (1, max(frame.shape)))
+    is_inside = around[row + 1, column + 1]
+    is_across = is_straight & ~is_inside[:, [*range(_BEYOND), *range(-_BEYOND, 0)]].any(axis=1)
+    is_across &= (is_inside.mean(axis=1) > 1 / 3) & ~(curves.line & ~curves.line.all())[first]
+    if not is_across.any():
+        return None
+    x, y = (start + way / 2)[np.argmax(is_across)]
+    count = f"{is_across.sum()} straight lines leave" if is_across.sum() > 1 else "1 straight line leaves"
+    return (
+        f"{count} the outline on both sides, first round ({x:.4g}, {y:.4g}); remove construction lines, or "
+        "draw them much paler or thinner than the others"
+    )

@@ -16,6 +16,7 @@ from .svg import read_svg
 
 _LINE: Final = 400  # widths of a line on the longer side of the drawing
 _RED: Final = ' stroke="#c8102e"'
+_FAINT: Final = ' stroke-opacity=".3"'
 
 
 def publishable_sketch(data: bytes, suffix: str) -> tuple[bytes, str]:
@@ -41,7 +42,7 @@ def svg_of_curves(curves: Curves) -> bytes:
     )
     lines = [
         root,
-        *(f'<path{_RED if red else ""} d="{"".join(data)}"/>' for red, data in _paths_by_colour(curves)),
+        *(f'<path{paint} d="{"".join(data)}"/>' for paint, data in _paths_by_paint(curves)),
         "</svg>\n",
     ]
     if sum(map(len, lines)) > MAX_DATA:
@@ -49,21 +50,22 @@ def svg_of_curves(curves: Curves) -> bytes:
     return "\n".join(lines).encode()
 
 
-def _paths_by_colour(curves: Curves) -> list[tuple[bool, list[str]]]:
-    """Path data by path, for consecutive runs of one colour and one letter that do not touch."""
+def _paths_by_paint(curves: Curves) -> list[tuple[str, list[str]]]:
+    """Paint and data by path, for consecutive runs of one paint and one letter that do not touch."""
     # A reader lists lines of a path before its cubics, and joins runs of a path that touch.
     starts = np.flatnonzero(np.diff(curves.curve, prepend=-1)).tolist()
-    paths: list[tuple[bool, list[str]]] = []
-    before: tuple[bool, bool] | None = None
+    paths: list[tuple[str, list[str]]] = []
+    before: tuple[str, bool] | None = None
     end: list[float] = []
     for first, after in pairwise([*starts, len(curves.points)]):
-        run, red = curves.points[first:after], bool(curves.red[first])
+        run, is_faint = curves.points[first:after], curves.faint is not None and curves.faint[first]
+        paint = (_RED if curves.red[first] else "") + (_FAINT if is_faint else "")
         straight = are_straight(run)
-        if (red, straight) != before or run[0, 0].tolist() == end:
-            paths.append((red, []))
+        if (paint, straight) != before or run[0, 0].tolist() == end:
+            paths.append((paint, []))
         moves = f"L{_join_numbers(run[:, 3:])}" if straight else f"C{_join_numbers(run[:, 1:])}"
         paths[-1][1].append(f"M{_join_numbers(run[0, 0])}{moves}")
-        before, end = (red, straight), run[-1, 3].tolist()
+        before, end = (paint, straight), run[-1, 3].tolist()
     return paths
 
 

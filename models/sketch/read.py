@@ -30,7 +30,7 @@ from .doubts import (
 from .drawing_file import Drawing, parse_drawing, read_file
 from .labels import label_of
 from .outline import find_inside, find_strokes_along_outline, keep_parts_with_strokes
-from .parallels import leave_out_parallels
+from .parallels import describe_lines_across, leave_out_parallels
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
@@ -189,6 +189,7 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
     warnings = _list_warnings(
         *drawing.notes,
         describe_open_drawing(region),
+        describe_lines_across(drawing, region, frame) if isinstance(drawing, Curves) else None,
         describe_loose_strokes(walls, region, frame),
         describe_crowding(covers.filled, mask, frame),
     )

@@ -31,11 +31,11 @@ from ..input_limits import (
     MAX_USES,
 )
 from ..instance.angles import transform_vectors, vector_length
-from ..instance.domain import Floats
+from ..instance.domain import Bools, Floats
 from .cascade import UNSHOWN, background_of, cascade_of
 from .colour import PAPER, is_red
 from .cover import Box
-from .curves import Curves, lines_as_cubics, run_numbers
+from .curves import STRAIGHT, Curves, lines_as_cubics, run_numbers
 from .labels import LabelMatcher, colour_label, labels_of
 from .path_data import SHAPES, shape_curves, too_many_curves
 from .svg_effort import choose_side
@@ -82,6 +82,8 @@ _SIDES: Final = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "b
 _WIDEST: Final = 0.05  # greatest width of a filled stroke as a share of the drawing: others are areas
 _LONG: Final = 10.0  # least half perimeter of a filled stroke in its widths
 _PAINTED: Final = 0.1  # least length of traced strokes, as a share of the length of others
+_FAINT: Final = 0.24  # of the strength of others: less than half as dark, or a quarter as wide
+_STRONG: Final = 0.1  # of the length of lines: part that is stronger than what others are compared with
 _MOST_STOPS: Final = 100  # stops of a gradient that count
 _MOST_BODIES: Final = 1000  # larger areas with which an area is compared
 
@@ -140,7 +142,7 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     else:
         seen, notes = see_strokes(framed, window, shapes)
         curves = _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
-    for values in (curves.points, curves.curve, curves.red, curves.chosen):
+    for values in (curves.points, curves.curve, curves.red, curves.chosen, curves.faint):
         if values is not None:
             values.setflags(write=False)
     return curves
@@ -324,18 +326,54 @@ def _join_strokes(
     """The curves of what is seen of the shapes, with colours and choices. Raises InputError."""
     if not sum(len(part.points) for part in seen):
         raise InputError(f"shows no stroke: {'; '.join(notes) or 'all have the colour of the paper'}")
+    red, taken = is_red(np.array([part.colour for part in seen])), None
+    if matcher is not None:
+        taken = np.array(
+            [
+                (len(part.points) > 0 and matcher.matches([colour_label(part.colour)])) or shape.chosen
+                for shape, part in zip(shapes, seen, strict=True)
+            ]
+        )
+    is_faint = _find_faint(seen, red) if taken is None else _find_faint(seen, taken) & ~taken
     points = np.concatenate([part.points for part in seen])
     number = np.repeat(np.arange(len(seen), dtype=np.int32), [len(part.points) for part in seen])
-    red = is_red(np.array([part.colour for part in seen]))
     chosen = None
-    if matcher is not None:
-        taken = [
-            (len(part.points) > 0 and matcher.matches([colour_label(part.colour)])) or shape.chosen
-            for shape, part in zip(shapes, seen, strict=True)
-        ]
-        chosen = np.array(taken)[number]
+    if matcher is not None and taken is not None:
+        chosen = taken[number]
         matcher.check(any_stroke=bool(chosen.any()))
-    return Curves(points, run_numbers(points, number), red[number], page.box if page else None, chosen, notes)
+    box = page.box if page else None
+    return Curves(points, run_numbers(points, number), red[number], box, chosen, notes, is_faint[number])
+
+
+def _find_faint(seen: Sequence[Seen], is_line: Bools) -> Bools:
+    """Which lines are much paler or thinner than the others of their kind; straight ones, than all others.
+
+    Where all strokes are curvature lines, pale ones may be sections of the object. Only straight ones that
+    begin and end outside of the others are surely construction lines.
+    """
+    strength = np.array([part.strength for part in seen])
+    ends = np.array([part.points[[0, -1], [0, 3]] if len(part.points) else np.zeros((2, 2)) for part in seen])
+    legs = [vector_length(*np.moveaxis(np.diff(part.points, axis=1), -1, 0)) for part in seen]
+    length = np.array([leg.sum() for leg in legs])
+
+    def is_weak(kind: Bools) -> Bools:
+        drawn = np.flatnonzero(kind & (length > 0) & np.isfinite(strength))
+        if not len(drawn):
+            return kind & False
+        drawn = drawn[np.argsort(-strength[drawn], kind="stable")]
+        ahead = np.cumsum(length[drawn])
+        strong = strength[drawn[np.searchsorted(ahead, _STRONG * ahead[-1])]]
+        return np.asarray(kind & (strength <= _FAINT * strong))
+
+    weak = is_weak(np.ones(len(seen), dtype=bool))
+    is_straight = vector_length(*(ends[:, 1] - ends[:, 0]).T) >= STRAIGHT * length
+    if is_line.any() and not is_line.all():
+        return (weak & is_straight) | is_weak(is_line) | is_weak(~is_line)
+    corners = np.concatenate(
+        [part.points.reshape(-1, 2) for part, faint in zip(seen, weak, strict=True) if not faint]
+    )
+    is_outside = ((ends < corners.min(axis=0)) | (ends > corners.max(axis=0))).any(axis=2).all(axis=1)
+    return weak & is_straight & is_outside
 
 
 def _list_unread(

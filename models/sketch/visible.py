@@ -64,10 +64,15 @@ class PaintedShape:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """The visible part of a shape: control points (m, 4, 2), and red, green, blue in [0, 1]."""
+    """The visible part of a shape.
+
+    points: (m, 4, 2), control points. colour: red, green, blue in [0, 1]. strength: of its line, the square
+    of its difference from the ground, in [0, 1], times its width; not a number for an area.
+    """
 
     points: Floats
     colour: tuple[float, float, float]
+    strength: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +115,8 @@ def see_strokes(
         ground = picture_of(root)
     inside = samples.pixel >= 0
     colour = np.where(inside[:, None], _at(shown, samples.pixel), np.nan)
-    contrast = inside & (np.abs(colour - _at(ground, samples.pixel)).max(axis=1) > PAPER)
+    difference = np.abs(colour - _at(ground, samples.pixel)).max(axis=1)
+    contrast = inside & (difference > PAPER)
     expected = np.array([opaque_colour(shape.paint) for shape in shapes])[samples.shape]
     own = contrast & (np.abs(colour - expected).max(axis=1) <= _SAME)
     notes: tuple[str, ...] = ()
@@ -121,7 +127,7 @@ def see_strokes(
         # A stroke in the colour of its ground is none, and needs no note.
         notes = _describe_hidden(samples, shapes, ~visible & (front != 2 * samples.shape))
     colour[~_shows_colour(samples, visible & contrast, front, own)] = np.nan
-    return _collect(samples, shapes, visible, colour, expected), notes
+    return _collect(samples, shapes, visible, np.column_stack([colour, difference]), expected), notes
 
 
 def _shows_colour(samples: _LineSamples, visible: Bools, front: Indices, own: Bools) -> Bools:
@@ -296,7 +302,10 @@ def _describe_hidden(samples: _LineSamples, shapes: Sequence[PaintedShape], lost
 def _collect(
     samples: _LineSamples, shapes: Sequence[PaintedShape], visible: Bools, colour: Floats, expected: Floats
 ) -> list[Seen]:
-    """The visible parts of each shape, whole cubics unchanged. colour: (s, 3), nan where another's."""
+    """The visible parts of each shape, whole cubics unchanged.
+
+    colour: (s, 4), red, green, blue, nan where another's, and their difference from the ground.
+    """
     points = np.concatenate([shape.points for shape in shapes])
     before = np.r_[False, visible[:-1] & (np.diff(samples.cubic) == 0)]
     after = np.r_[before[1:] & visible[1:], False]
@@ -305,12 +314,16 @@ def _collect(
     bounds = np.searchsorted(samples.shape[starts], np.arange(len(shapes) + 1))
     edges = np.searchsorted(samples.shape, np.arange(len(shapes) + 1))
     seen = []
-    for number in range(len(shapes)):
+    for number, shape in enumerate(shapes):
         within = slice(edges[number], edges[number + 1])
         shown = colour[within][np.isfinite(colour[within, 0])]
-        rgb = np.nan_to_num(expected[edges[number]]) if edges[number] < edges[number + 1] else np.zeros(3)
-        if len(shown) and not (np.abs(np.median(shown, axis=0) - rgb) <= _SAME).all():
-            rgb = np.median(shown, axis=0)
-        red, green, blue = rgb.tolist()
-        seen.append(Seen(parts[bounds[number] : bounds[number + 1]], (red, green, blue)))
+        rgb, strength = np.full(3, np.nan), np.nan
+        if edges[number] < edges[number + 1]:
+            rgb = expected[edges[number]]
+        if len(shown):
+            *median, difference = np.median(shown, axis=0)
+            strength = difference**2 * shape.width if shape.is_stroked else np.nan
+            rgb = rgb if (np.abs(median - rgb) <= _SAME).all() else np.array(median)
+        red, green, blue = np.nan_to_num(rgb).tolist()
+        seen.append(Seen(parts[bounds[number] : bounds[number + 1]], (red, green, blue), strength))
     return seen

@@ -1,5 +1,6 @@
 """Hatching and ruled paper, and families of curvature lines that are neither."""
 
+import re
 from functools import cache
 
 import crossfield as cf
@@ -75,6 +76,19 @@ def test_a_family_is_reported_with_its_place():
 )
 def test_other_lines_are_no_hatching(lines):
     assert not any("hatching" in warning for warning in drawing(lines, FLOW).reading.warnings)
+
+
+@for_each(
+    "ends, named",
+    [
+        (("M20 150H280", "M150 20V280"), "2 straight lines leave .* both sides, first round"),
+        (("M55 150H280",), None),  # overshoots
+    ],
+)
+def test_straight_lines_through_the_outline_are_named(ends, named):
+    lines = "".join(f'<path d="{line}" fill="none" stroke="black"/>' for line in ends)
+    warnings = drawing(BODY, FLOW, lines).reading.warnings
+    assert [bool(re.match(named or "", line)) for line in warnings] == ([True] if named else [])
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="needs the drawings in ../shared/sketches")
