@@ -169,12 +169,10 @@ Expressions:
 
 {NAMED}
 
-Options:
+Prescribed [indices](mathematics.md#12-surfaces) of an instance fix $k_c$ along rings. Options:
 
 - `limits` replaces $d^{{\max}} = q^{{\max}} = \pi/4$ by
   [smaller ones](mathematics.md#14-limits-of-residuals), which cut off no optimum.
-- `indices` fixes $k_c$ along the rings of some vertices of a mesh, and so
-  [the index there](mathematics.md#12-surfaces), among fields whose residuals are at most $\pi/4$.
 - `facet=printed` replaces row (26) by the paper's bound $z \ge -\pi/4$.
 - `stroke_norm` and `beta_norm`, 1 or 2, are the indices of $\text{{strokes}}$ and $\text{{skew}}$.
 - `relax` makes integers continuous, except in `qp-fixed`.

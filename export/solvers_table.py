@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from importlib.util import find_spec
 from typing import Final, Literal, NamedTuple
 
@@ -340,7 +340,6 @@ def smallest_problem(formulation: Formulation) -> Problem:
     pixels, ones = np.zeros((1, 2), dtype=np.int32), np.ones(1)
     mask, orthogonal = np.ones((2, 2), dtype=bool), formulation.declaration.orthogonal
     instance = Instance.on_pixels("smallest", mask, pixels, ones, ones, orthogonal=orthogonal)
-    of_pixels = replace(formulation, options=replace(formulation.options, indices=()))
     return Problem(
-        instance, of_pixels, np.zeros(4, dtype=np.int32) if formulation.declaration.fixed else None
+        instance, formulation, np.zeros(4, dtype=np.int32) if formulation.declaration.fixed else None
     )

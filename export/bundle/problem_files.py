@@ -19,7 +19,7 @@ from typing import Any, overload
 from ...models.arguments import check_choice, check_flag
 from ...models.errors import InputError, UnsupportedByFormatError
 from ...models.field.field import CrossField
-from ...models.formulations.catalogue import FORMULATIONS, declaration_of
+from ...models.formulations.catalogue import declaration_of
 from ...models.formulations.choice import list_formulations
 from ...models.formulations.declaration import Declaration, Options
 from ...models.formulations.problem import Problem, formulate
@@ -141,8 +141,7 @@ def write_all(
     windows
         Narrower windows of alpha and beta and ranges of jumps, for all formulations.
     options
-        `facet`, `stroke_norm`, `beta_norm`, `relax` and `limits`, each used where a formulation has it, and
-        `indices`, which other formulations refuse.
+        `facet`, `stroke_norm`, `beta_norm`, `relax` and `limits`, each used where a formulation has it.
     compress
         Whether to write model files as .gz.
     force
@@ -172,12 +171,10 @@ def write_all(
     options = options or {}
     if formulations is None:
         formulations = list_formulations(instance, narrowed=windows is not None)
-        if options.get("indices"):
-            formulations = [name for name, one in FORMULATIONS.items() if "indices" in one.option_names]
     declarations = [declaration_of(name) for name in formulations]
 
     def chosen(declaration: Declaration) -> dict[str, Any]:
-        unfit = {*Options.__dataclass_fields__} - declaration.option_names - {"indices"}
+        unfit = {*Options.__dataclass_fields__} - declaration.option_names
         return {key: value for key, value in options.items() if key not in unfit}
 
     formats = tuple(formats)

@@ -144,6 +144,7 @@ def instance_command(
     sharp_weight: options.SharpWeight = None,
     merge: options.Merge = None,
     crosses: options.Crosses = None,
+    indices: options.Indices = None,
     gauge: options.Gauge = None,
     skew_weight: options.SkewWeight = None,
     force: options.Force = False,
@@ -155,6 +156,7 @@ def instance_command(
     With the suffix .png, write the mask of the instance: white where the field is wanted. Edit it in a paint
     program and pass it to --mask. With .sharp, write the edges of a mesh that have strokes, for QuadWild.
     """
+    from ...models.field.exchange import read_sings
     from ...models.instance.file import write_instance
     from ...models.mesh.sharp_edges import write_sharp_edges
     from ..pictures.mask import write_mask
@@ -166,7 +168,7 @@ def instance_command(
         ".sharp": write_sharp_edges,
     }
     require_suffix(output, *writers)
-    check_output(output, source, mask, directions, force=force)
+    check_output(output, source, mask, directions, indices, force=force)
     with show_progress() as show:
         show("reading the sketch")
         sketch = {"size": size, "mask": mask, "silhouette": silhouette, "curvature": curvature, "view": view}
@@ -181,8 +183,9 @@ def instance_command(
         instance = read_source(source, stroke_weight=stroke_weight, sketch=sketch, mesh=of_mesh)
         instance = instance.with_weights(skew_weight=skew_weight)
         instance = instance if gauge is None else instance.with_gauge(gauge)
-        if crosses is not None:
-            instance = replace(instance, orthogonal=crosses == "orthogonal")
+        orthogonal = instance.orthogonal if crosses is None else crosses == "orthogonal"
+        prescribed = instance.indices if indices is None else read_sings(indices)
+        instance = replace(instance, orthogonal=orthogonal, indices=prescribed)
         writers[output.suffix.lower()](instance, output, force=force)
     print_line(f"{output}: {instance.summary}")
 
@@ -200,7 +203,6 @@ def export_command(
     beta_norm: options.BetaNorm = None,
     relax: options.Relax = False,
     limits: options.ResidualLimits = False,
-    indices: options.Indices = None,
     start: options.Start = None,
     tightened: options.Tightened = None,
     compress: options.Gzip = False,
@@ -212,7 +214,6 @@ def export_command(
     By default, formulations that the instance cannot have are left out. Each formulation also has a manifest
     (.manifest.json), which `crossfield read` needs.
     """
-    from ...models.field.exchange import read_sings
     from ..bundle.problem_files import write_all
     from ..formats.registry import DEFAULTS, FORMATS
 
@@ -243,7 +244,6 @@ def export_command(
                 "beta_norm": beta_norm,
                 "relax": relax or None,
                 "limits": limits or None,
-                "indices": None if indices is None else read_sings(indices),
             },
             compress=compress,
             force=force,

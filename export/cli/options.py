@@ -252,15 +252,6 @@ ResidualLimits = Annotated[
         "stays.",
     ),
 ]
-Indices = Annotated[
-    Path | None,
-    _formulating(
-        "--indices",
-        metavar="FILE",
-        help="Indices that vertices of a mesh must have: a .sings, with a line `4 N` and N lines of a vertex,"
-        " from 0, and four times its index. Only miqp-cycle and milp-cycle take them.",
-    ),
-]
 FormulationName = Annotated[
     str | None, _formulation(help="Solve this formulation; `crossfield list` has their full and short names.")
 ]
@@ -408,6 +399,15 @@ Crosses = Annotated[
         "--crosses",
         help="Crosses of right angles, without variables for the skew (orthogonal), or of any angles"
         " (skewed); by default orthogonal on meshes and skewed on sketches.",
+    ),
+]
+Indices = Annotated[
+    Path | None,
+    typer.Option(
+        "--indices",
+        metavar="FILE",
+        help="Indices that orthogonal crosses must have at some vertices: a .sings, with a line `4 N` and N"
+        " lines of a vertex, from 0, and four times its index.",
     ),
 ]
 SkewWeight = Annotated[

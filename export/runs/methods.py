@@ -253,6 +253,7 @@ METHODS: Final = {
             " first factorisation",
             _find_power,
             timed=False,
+            takes=lambda instance: instance.indices is None,
         ),
         Method(
             "polyvector",
@@ -280,6 +281,7 @@ METHODS: Final = {
             "section 5 of the paper: HiGHS on milp-mccormick up to the time limit, Ipopt on qp-fixed",
             _find_in_two_stages,
             in_parallel=True,
+            takes=lambda instance: instance.indices is None,
             solves=(("milp-mccormick", "highs"), ("qp-fixed", "ipopt")),
         ),
         Method(
@@ -304,7 +306,8 @@ def find_method(name: str, instance: Instance) -> Method:
     if name not in names:
         raise DomainError(
             f"{name} finds no fields on the {instance.domain.kind}s of {instance.name} with "
-            f"{'right' if instance.orthogonal else 'free'} angles; use {', '.join(names)}"
+            f"{'right' if instance.orthogonal else 'free'} angles"
+            f"{' and prescribed indices' * (instance.indices is not None)}; use {', '.join(names)}"
         )
     return METHODS[name]
 

@@ -16,7 +16,6 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from ...models.field.triangles import vertices_of
 from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.storage import replace_results, write_bytes
@@ -258,7 +257,7 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
 def to_obj(surface: Surface, materials: str, box: Box) -> bytes:
     """The mesh as text. materials: name of the .mtl file in its folder. box: what its texture shows."""
     instance = surface.instance
-    places, corners = vertices_of(instance.grid)
+    places, corners = instance.grid.vertices
     row, column = places.T
     points = np.column_stack([column, instance.grid.height - row, surface.heights[row, column]])
     steps = instance.pixel_size * places[:, ::-1] + instance.origin

@@ -169,7 +169,7 @@ def _test_points(problem: Problem) -> Points:
     """Arbitrary points, then complete points of random fields, which respect bounds, rows and integrality."""
     rng = np.random.default_rng(SEED)
     anywhere = rng.normal(size=(RANDOM_POINTS, problem.n_columns))
-    seeds = range(0 if problem.formulation.options.indices else FIELD_POINTS)  # which random fields have not
+    seeds = range(FIELD_POINTS if problem.instance.indices is None else 0)  # which random fields have not
     feasible = [problem.point(random_field(problem, seed)) for seed in seeds]
     values = np.concatenate([anywhere, np.reshape(feasible, (-1, problem.n_columns))])
     objective = np.array([problem.objective_value(point) for point in values])

@@ -24,7 +24,7 @@ import numpy as np
 from ..arguments import whole_numbers
 from ..errors import InputError, InstanceError, naming, quote_line
 from ..input_limits import MAX_BYTES, MAX_NUMBER
-from ..instance.domain import Floats
+from ..instance.domain import Floats, Ints
 from ..instance.instance import Instance
 from ..instance.mesh import Mesh
 from ..storage import read_bytes
@@ -143,15 +143,14 @@ def _parse_rosy(data: bytes, instance: Instance) -> CrossField:
     return field_of_vectors(instance, u, np.cross(normals if len(normals) == len(u) else normals[::2], u))
 
 
-def read_sings(path: Path) -> list[list[int]]:
-    """Vertices and four times their indices in a .sings. Raises InputError that names the line."""
+def read_sings(path: Path) -> Ints:
+    """Vertices and four times their indices in a .sings, (k, 2). Raises InputError that names the line."""
     with naming(path):
         body = filled_lines(plain_text(read_bytes(path, MAX_BYTES)))
         numbers = number_rows(body, 2, "a vertex and four times its index (in the first line 4 and a count)")
         if numbers[:1].tolist() != [[4, len(numbers) - 1]]:
             raise InputError(f"does not begin with 4 {max(len(numbers) - 1, 0)}, the number of its vertices")
-        rows: list[list[int]] = whole_numbers(numbers[1:], "a row", InputError).tolist()
-        return rows
+        return whole_numbers(numbers[1:], "a row", InputError)
 
 
 def _check_triangles(count: int, instance: Instance, place: str = "") -> None:

@@ -31,6 +31,7 @@ FAR: Final = np.radians(10)  # A stroke that deviates more than this from both l
 NARROW: Final = QUARTER  # lines that are less than this apart are a narrow cross
 MOST: Final = 0.9  # share of the stroke pixels that deviate no more than `Shape.most_deviation`
 _EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
+_TIE: Final = 1e-3  # relative to pi/4: what |A| may exceed it by before another jump is the nearest one
 _ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
 
 
@@ -149,11 +150,21 @@ class CrossField(Pictured):
         return self
 
     def check_instance(self, instance: Instance) -> None:
-        """Raise InstanceError unless the field is on this instance."""
+        """Raise InstanceError unless the field is on this instance, with its prescribed indices."""
         if self.instance.sha256 != instance.sha256:
             raise InstanceError(
                 f"the field is on another instance ({self.instance.summary}), not on this one "
                 f"({instance.summary}); give a field of the same sketch, size, gauge and weights"
+            )
+        if (rings := instance.prescribed_rings) is None:
+            return
+        beyond = np.round(self.residual_a / HALF * (1 - _TIE))  # jumps that do not join nearest lines
+        off = rings.sums(self.p - beyond) - rings.turns
+        if off.any():
+            vertex, wanted = np.asarray(instance.indices)[np.argmax(off != 0)]
+            raise InstanceError(
+                f"the field has index {wanted - off[off != 0][0]:.0f}/4 at vertex {vertex}, but {wanted}/4"
+                f" is prescribed ({np.count_nonzero(off)} such vertices); search and prove find such fields"
             )
 
     @property
@@ -326,7 +337,7 @@ def energy_of(instance: Instance, alpha: Floats, beta: Floats, p: Ints, norm: No
 def field_in_windows(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -> CrossField:
     """The same crosses with every alpha in its window of the gauge and |beta| <= pi/4, or clipped to that.
 
-    Each pair gets its best jump; without clipping the energy does not rise.
+    Each pair gets its best jump, unless indices are prescribed; without clipping the energy does not rise.
     """
     alpha, beta, p = step_labels(
         instance.domain, alpha, beta, p, _steps_into_windows(instance, alpha, beta, inside=False)
@@ -337,7 +348,7 @@ def field_in_windows(instance: Instance, alpha: Floats, beta: Floats, p: Ints) -
         np.clip(beta, -QUARTER, QUARTER),
         np.clip(p, instance.p_min, instance.p_max),
     )
-    best = clipped.with_best_jumps()
+    best = clipped.with_best_jumps() if instance.indices is None else clipped
     return best if best.energy().total < clipped.energy().total else clipped
 
 

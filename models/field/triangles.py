@@ -13,7 +13,6 @@ import numpy as np
 
 from ..instance.angles import arctangent, double_angle, line_difference, line_of
 from ..instance.domain import Floats, Ints
-from ..instance.grid import Grid
 from ..instance.instance import Instance
 from ..instance.mesh import Mesh
 from .field import CrossField
@@ -25,7 +24,7 @@ def mesh_of(instance: Instance) -> Mesh:
     """The mesh of an instance, or the triangles of its pixels."""
     if isinstance(instance.domain, Mesh):
         return instance.domain
-    places, corners = vertices_of(instance.grid)
+    places, corners = instance.grid.vertices
     x = instance.origin[0] + instance.pixel_size * places[:, 1]
     y = -(instance.origin[1] + instance.pixel_size * places[:, 0])
     vertices = np.stack([x, y, np.zeros(len(x))], axis=1) + 0.0
@@ -47,14 +46,7 @@ def vectors_of(field: CrossField) -> Floats:
 def singular_vertices(field: CrossField) -> tuple[Ints, Floats]:
     """Vertices of `mesh_of` around which the crosses turn, ascending, and their indices in turns."""
     singularities = field.singularities
-    if isinstance(field.instance.domain, Mesh):
-        return singularities.vertex, singularities.index
-    places, _ = vertices_of(field.instance.grid)
-    across = field.instance.grid.width + 1
-    key = (singularities.row + 1) * across + singularities.column + 1
-    at = np.searchsorted(places[:, 0] * across + places[:, 1], key)
-    order = np.argsort(at, kind="stable")
-    return at[order].astype(np.int32), singularities.index[order]
+    return field.instance.domain.ring_vertices[singularities.ring], singularities.index
 
 
 def field_of_vectors(instance: Instance, u: Floats, v: Floats) -> CrossField:
@@ -76,21 +68,6 @@ def triangle_counts(instance: Instance) -> tuple[int, ...]:
     """Numbers of rows that a file about the instance may have, the one that is written first."""
     size = instance.domain.size
     return (size,) if isinstance(instance.domain, Mesh) else (2 * size, size)
-
-
-def vertices_of(grid: Grid) -> tuple[Ints, Ints]:
-    """Vertices [row, column] (k, 2), and the vertex at each corner of each pixel (n, 4), row by row."""
-    down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
-    row, column = grid.rows[:, None] + down, grid.columns[:, None] + right
-    inside = np.pad(grid.mask, 1)
-    # Pixels round the corner: the one diagonally across, and the two at its sides.
-    across = inside[row + down, column + right]
-    beside = inside[row + down, column + 1 - right] | inside[row + 1 - down, column + right]
-    apart = across & ~beside & (right == 1)
-    key = 2 * (row.astype(np.int64) * (grid.width + 1) + column) + apart
-    vertices, corners = np.unique(key, return_inverse=True)
-    places = np.stack(np.divmod(vertices // 2, grid.width + 1), axis=1)
-    return places.astype(np.int32), corners.reshape(key.shape).astype(np.int32)
 
 
 def _lines_between(u: Floats, v: Floats) -> tuple[Floats, Floats]:

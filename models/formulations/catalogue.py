@@ -26,7 +26,6 @@ from .declaration import (
     term,
 )
 from .expressions import Operand, cos, equal
-from .indices import Indices
 from .symbols import (
     B_LIFTED,
     A,
@@ -227,7 +226,7 @@ def milp_orthogonal(stroke_norm: int = 1) -> Families:
     "miqp-cycle", paper="ours", kind="convex MIQP", short="cycle",
     minimises=RIGHT_TWO_NORM, how=BY_CYCLES, orthogonal=True,
 )  # fmt: skip
-def miqp_cycle(limits: bool = False, indices: Indices = ()) -> Families:  # noqa: ARG001 - bounds depend on them
+def miqp_cycle(limits: bool = False) -> Families:  # noqa: ARG001 - the bounds of d depend on it
     """Orthogonal crosses without windows and alpha: one integer per cycle."""
     yield term("smooth", E, omega * (2 * d**2))
     yield from strokes(2, q)
@@ -238,7 +237,7 @@ def miqp_cycle(limits: bool = False, indices: Indices = ()) -> Families:  # noqa
     "milp-cycle", paper="ours", kind="MILP", short="cycle1",
     minimises=RIGHT_ONE_NORM, how=BY_CYCLES, orthogonal=True,
 )  # fmt: skip
-def milp_cycle(stroke_norm: int = 1, indices: Indices = ()) -> Families:  # noqa: ARG001 - the bounds of k
+def milp_cycle(stroke_norm: int = 1) -> Families:
     """Orthogonal crosses in the 1-norm without windows and alpha: one integer per cycle."""
     yield term("smooth", E, omega * (2 * s))
     yield row(14, E, s >= d)

@@ -32,6 +32,11 @@ def reason_against(formulation: Formulation, instance: Instance | None, *, narro
     narrowed: whether its windows are narrower than those of its gauge.
     """
     has_windows = "alpha" in formulation.variables
+    if instance is not None and instance.indices is not None:
+        if "k" not in formulation.variables:
+            return "lets vertices have any index, and some are prescribed; choose miqp-cycle or milp-cycle"
+        if formulation.options.limits:
+            return "has limits only where every jump may change, and indices are prescribed; leave limits out"
     if not formulation.declaration.orthogonal:
         return ""
     if instance is None or not instance.orthogonal:

@@ -18,7 +18,6 @@ from typing import Any, Final, Literal, get_args
 from ..arguments import check_choice, check_flag
 from ..errors import FormulationError, shortened
 from .expressions import Expression, Operand, Relation, Symbol, Term, expression_of, sum_of
-from .indices import Indices, as_indices
 from .symbols import (
     BOUNDED,
     SLOTS,
@@ -129,7 +128,7 @@ class Options:
     """Choices that a formulation leaves open.
 
     facet of z; norms of the two terms; relax: integrality dropped; limits: whether residuals are limited to
-    what no change of one jump improves (`limit_residuals`); indices: prescribed ones of vertices.
+    what no change of one jump improves (`limit_residuals`).
     """
 
     facet: Facet = "hull"
@@ -137,12 +136,11 @@ class Options:
     beta_norm: int = 2
     relax: bool = False
     limits: bool = False
-    indices: Indices = ()
 
     @property
     def document(self) -> dict[str, Any]:
-        """The options as files record them: the last two only where they are chosen, for older files."""
-        return {k: value for k, value in vars(self).items() if k not in {"limits", "indices"} or value}
+        """The options as files record them: the last one only where it is chosen, for older files."""
+        return {k: value for k, value in vars(self).items() if k != "limits" or value}
 
     def __repr__(self) -> str:
         return f"Options({', '.join(f'{name}={value!r}' for name, value in self.document.items())})"
@@ -231,12 +229,7 @@ class Declaration:
                 raise FormulationError(f"{name} is {getattr(options, name)}; give 1 or 2")
         # NumPy's numbers are written differently, and the options are a part of the problem's hash.
         norms = int(options.stroke_norm), int(options.beta_norm)
-        indices = as_indices(options.indices)
-        if indices and options.limits:
-            raise FormulationError(
-                "limits hold where every jump may change, and indices prescribe some; leave one of them out"
-            )
-        return Options(options.facet, *norms, bool(options.relax), bool(options.limits), indices)
+        return Options(options.facet, *norms, bool(options.relax), bool(options.limits))
 
 
 @dataclass(frozen=True)

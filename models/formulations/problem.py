@@ -28,7 +28,6 @@ from .choice import declare, norm_of, reason_against
 from .declaration import Family, Formulation
 from .expressions import Operand, expression_of
 from .families import ANY_DEGREE, Block, PlacedFamily, merge_terms
-from .indices import fix_turns, with_rings
 from .lifting import lift_products
 from .residuals import angles_and_jumps, residual_data
 from .symbols import (
@@ -89,7 +88,7 @@ class Problem:
     FormulationError
         For jumps that are missing, or that are given to a formulation in which they are variables; for a
         formulation of orthogonal crosses on another instance, or without windows on one of the gauge `box`;
-        for indices that no field has.
+        for one that cannot prescribe the indices of an instance.
 
     """
 
@@ -119,9 +118,6 @@ class Problem:
             self.pinned.check_instance(self.instance)
         if self.windows is not None:
             self.windows.check(self.instance)
-        if indices := self.formulation.options.indices:
-            object.__setattr__(self, "instance", with_rings(self.instance, indices))
-            self.data.keys()  # raises for indices that no field has
 
     def __repr__(self) -> str:
         return f"<Problem {self.summary}>"
@@ -166,8 +162,6 @@ class Problem:
         if self.formulation.declaration.orthogonal:
             has_cycles = "k" in self.formulation.variables
             data |= residual_data(self.instance, self.formulation.options.limits, cycles=has_cycles)
-        if indices := self.formulation.options.indices:
-            data["k_min"], data["k_max"] = fix_turns(self.instance, indices, data["k_min"], data["k_max"])
         if self.jumps is not None:
             data |= {"p1": self.jumps & 1, "p2": self.jumps >> 1}
         return data if self.windows is None else data | self.windows.data
@@ -193,7 +187,7 @@ class Problem:
     @property
     def limited(self) -> str:
         """A line on the fields that limits or prescribed indices exclude; empty without them."""
-        if indices := self.formulation.options.indices:
+        if (indices := self.instance.indices) is not None:
             return f"the indices of {len(indices)} vertices are prescribed, and |A| and |R| are at most pi/4"
         if not self.formulation.options.limits:
             return ""
@@ -628,8 +622,8 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
         Jumps of the pairs, shape (m,), for `qp-fixed` only.
     options
         Where the formulation has them: `facet` (`hull` or `printed`), `stroke_norm` and `beta_norm` (1 or 2),
-        `relax` (True makes integers continuous), `limits` (True cuts off fields that a change of one jump
-        improves), and `indices`: pairs of a vertex and four times the index that its ring must have.
+        `relax` (True makes integers continuous), and `limits` (True cuts off fields that a change of one jump
+        improves).
 
     Returns
     -------

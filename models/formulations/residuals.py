@@ -56,12 +56,16 @@ def _cycle_data(instance: Instance, d_max: Floats, q_max: Floats) -> dict[str, A
     reach = np.zeros(len(is_open))
     np.add.at(reach, np.repeat(np.arange(len(reach)), np.diff(cycles.start)), d_max[cycles.pair])
     reach[is_open] += q_max[start] + q_max[end]
+    k_min, k_max = np.ceil((-reach - holonomy) / HALF - SLACK), np.floor((reach - holonomy) / HALF + SLACK)
+    if (prescribed := instance.prescribed_rings) is not None:  # a closed part has the last ring by the others
+        _, cycle, ring = np.intersect1d(cycles.rings, prescribed.number, return_indices=True)
+        k_min[cycle] = k_max[cycle] = prescribed.turns[ring]
     return {
         "sign": cycles.sign.astype(np.float64),
         "is_open": is_open.astype(np.int32),
         "holonomy": holonomy,
-        "k_min": np.ceil((-reach - holonomy) / HALF - SLACK),
-        "k_max": np.floor((reach - holonomy) / HALF + SLACK),
+        "k_min": k_min,
+        "k_max": k_max,
     }
 
 

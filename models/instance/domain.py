@@ -99,6 +99,11 @@ class Domain(ABC):
 
     @property
     @abstractmethod
+    def ring_vertices(self) -> Ints:
+        """The vertex inside each ring, as `mesh_of` numbers them, ascending, shape (r,)."""
+
+    @property
+    @abstractmethod
     def side(self) -> int:
         """Pixels of the longer side, 1 for a mesh."""
 

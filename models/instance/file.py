@@ -1,7 +1,7 @@
 """Instance files: documented JSON (instance.schema.json, mask as text rows) and .npz for large ones.
 
-A file has a mask with its strokes, or a mesh with its strokes. Whether crosses are orthogonal
-and the weights of pairs are written only where they are not the default.
+A file has a mask with its strokes, or a mesh with its strokes. Whether crosses are orthogonal,
+the weights of pairs and prescribed indices are written only where they are not the default.
 """
 
 from __future__ import annotations
@@ -49,7 +49,10 @@ _MESH_ARCHIVE: Final = {
     "faces": ExpectedArray(2, MOST_FACES, "iu"),
     "stroke_faces": ExpectedArray(1, MOST_FACES, "iu"),
 }
-_WEIGHTS: Final = {"pair_weights": ExpectedArray(1, max(2 * MAX_GRID**2, 2 * MOST_FACES))}
+_OPTIONAL: Final = {
+    "pair_weights": ExpectedArray(1, max(2 * MAX_GRID**2, 2 * MOST_FACES)),
+    "indices": ExpectedArray(2, _MOST_VERTICES, "iu"),
+}
 
 
 def write_instance(instance: Instance, path: str | Path, *, force: bool = False) -> Path:
@@ -120,6 +123,8 @@ def instance_to_json(instance: Instance) -> str:
     blocks = _mesh_blocks(instance) if isinstance(instance.domain, Mesh) else _grid_blocks(instance)
     if instance.pair_weights is not None:
         blocks["pair_weights"] = list(map(repr, instance.pair_weights.tolist()))
+    if instance.indices is not None:
+        blocks["indices"] = list(map(repr, instance.indices.tolist()))
     head = _head(instance)
     if isinstance(instance.domain, Grid):
         head["origin"] = list(instance.origin)
@@ -170,7 +175,7 @@ def instance_of_document(document: object) -> Instance:
 
 def _arrays_of_document(document: dict[str, Any]) -> dict[str, Any]:
     """The lists of a document as arrays, by the names of an .npz."""
-    lists = ("vertices", "faces", "origin", "pair_weights")
+    lists = ("vertices", "faces", "origin", *_OPTIONAL)
     arrays: dict[str, Any] = {key: document[key] for key in lists if key in document}
     if "vertices" in document:
         strokes = np.array(document["strokes"], dtype=np.float64).reshape(-1, 3)
@@ -191,7 +196,7 @@ def _arrays_of_document(document: dict[str, Any]) -> dict[str, Any]:
 def _make_instance(head: dict[str, Any], arrays: dict[str, Any]) -> Instance:
     """The instance of the scalars in a head and of arrays. Raises InstanceError."""
     more = {"name": head["name"]} | {name: head[key] for key, name in _SCALARS.items() if key in head}
-    more |= {key: arrays[key] for key in ("theta", "w", "pair_weights") if key in arrays}
+    more |= {key: arrays[key] for key in ("theta", "w", *_OPTIONAL) if key in arrays}
     if "vertices" in arrays:
         mesh = Mesh(arrays["vertices"], arrays["faces"])
         strokes = arrays["stroke_faces"]
@@ -216,14 +221,15 @@ def instance_arrays(instance: Instance) -> dict[str, np.ndarray[Any, Any]]:
         arrays["origin"] = np.array(instance.origin)
         arrays |= {"mask": instance.mask, "stroke_pixels": instance.stroke_pixels}
     arrays |= {"theta": instance.theta, "w": instance.w}
-    return arrays if instance.pair_weights is None else arrays | {"pair_weights": instance.pair_weights}
+    optional = {name: getattr(instance, name) for name in _OPTIONAL}
+    return arrays | {name: array for name, array in optional.items() if array is not None}
 
 
 def instance_of_archive(archive: ArrayArchive, prefix: str = "") -> Instance:
     """Read an instance from arrays whose names start with a prefix. Raises InstanceError."""
     of_domain = _MESH_ARCHIVE if f"{prefix}vertices" in archive else _GRID_ARCHIVE
-    weights = _WEIGHTS if f"{prefix}pair_weights" in archive else {}
-    return instance_of_arrays(archive.arrays(_ARCHIVE | of_domain | weights, prefix))
+    optional = {name: kind for name, kind in _OPTIONAL.items() if prefix + name in archive}
+    return instance_of_arrays(archive.arrays(_ARCHIVE | of_domain | optional, prefix))
 
 
 def instance_of_arrays(arrays: dict[str, np.ndarray[Any, Any]]) -> Instance:

@@ -198,6 +198,29 @@ class Grid(Domain):
         return walk[(walk >= 0).all(axis=-1)]
 
     @cached_property
+    def vertices(self) -> tuple[Ints, Ints]:
+        """Vertices [row, column] (k, 2), and the vertex at each corner of each pixel (n, 4), row by row.
+
+        Pixels that meet only in a corner each have their own vertex there.
+        """
+        down, right = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+        row, column = self.rows[:, None] + down, self.columns[:, None] + right
+        inside = np.pad(self.mask, 1)
+        # Pixels round the corner: the one diagonally across, and the two at its sides.
+        across = inside[row + down, column + right]
+        beside = inside[row + down, column + 1 - right] | inside[row + 1 - down, column + right]
+        apart = across & ~beside & (right == 1)
+        key = 2 * (row.astype(np.int64) * (self.width + 1) + column) + apart
+        vertices, corners = np.unique(key, return_inverse=True)
+        places = np.stack(np.divmod(vertices // 2, self.width + 1), axis=1)
+        return places.astype(np.int32), corners.reshape(key.shape).astype(np.int32)
+
+    @property
+    def ring_vertices(self) -> Ints:
+        """The common corner of the four pixels of each of `quads`, (r,), by its number in `vertices`."""
+        return np.asarray(self.vertices[1][self.first[self.quads[:, 0]], 1])
+
+    @cached_property
     def rings(self) -> Rings:
         """The ring around the common corner of the four pixels of each of `quads`."""
         start = np.arange(0, 4 * len(self.quads) + 1, 4, dtype=np.int32)

@@ -17,6 +17,7 @@ from .angles import HALF, MOST_ANGLE, QUARTER, SLACK, wrap
 from .cycles import Cycles, find_cycles
 from .domain import Bools, Floats, Ints
 from .grid import Grid
+from .indices import PrescribedRings, prescribe_rings, sort_indices
 from .mesh import Mesh
 from .terms import PairTerms, StrokeTerms
 
@@ -100,6 +101,9 @@ class Instance(Pictured):
         Whether all crosses have right angles: beta is 0 and no variable.
     pair_weights
         Weight of the smoothness of each pair, (m,), above 0 and up to 1e6; None where all are 1.
+    indices
+        Vertices, as files of singularities number them, and four times the index that each must have, int
+        (k, 2); None where crosses may have any. Only for orthogonal crosses under the gauge `strokes`.
     source
         Origin of the sketch or mesh, one line of text.
     view
@@ -128,6 +132,7 @@ class Instance(Pictured):
     gauge: Gauge = "strokes"
     orthogonal: bool = False
     pair_weights: Floats | None = None
+    indices: Ints | None = None
     source: str = ""
     view: str | None = None
     reading: Reading | None = None
@@ -214,6 +219,7 @@ class Instance(Pictured):
         self.domain.check()
         self._check_strokes()
         self._check_pair_weights()
+        self._check_indices()
         theta = np.round(wrap(self.theta, 0.0, np.pi), _DECIMALS)
         theta = np.where((theta < _FLAT) | (theta > np.pi - _FLAT), 0.0, theta)
         self._freeze("theta", np.where(np.abs(theta - QUARTER) < _FLAT, QUARTER, theta))
@@ -274,6 +280,18 @@ class Instance(Pictured):
                 f"the weight of pair {int(np.argmax(wrong))} is {weights[wrong][0]}; "
                 f"it must be above 0 and at most {MOST_WEIGHT:g}"
             )
+
+    def _check_indices(self) -> None:
+        if self.indices is None:
+            return
+        indices = sort_indices(self.indices)
+        object.__setattr__(self, "indices", None if indices is None else _read_only(indices))
+        if indices is not None and not (self.orthogonal and self.gauge == "strokes"):
+            raise InstanceError(
+                "indices are prescribed for orthogonal crosses under the gauge strokes only; make the "
+                "instance orthogonal, or leave indices out"
+            )
+        self.prescribed_rings  # noqa: B018 - raises for indices that no field has
 
     @property
     def grid(self) -> Grid:
@@ -343,7 +361,16 @@ class Instance(Pictured):
     @cached_property
     def cycles(self) -> Cycles:
         """A basis of the cycles of pairs and strokes, along which alone jumps matter."""
-        return find_cycles(self.domain, self.stroke_index)
+        prescribed = self.prescribed_rings
+        wanted = None if prescribed is None else prescribed.number
+        return find_cycles(self.domain, self.stroke_index, wanted)
+
+    @cached_property
+    def prescribed_rings(self) -> PrescribedRings | None:
+        """The rings of vertices with prescribed indices; None without any."""
+        if self.indices is None:
+            return None
+        return prescribe_rings(self.domain, self.indices)
 
     @cached_property
     def alpha_lower(self) -> Floats:
@@ -447,8 +474,12 @@ class Instance(Pictured):
         """Name, domain, strokes, gauge, right angles, and weights unless they are defaults."""
         return (
             f"{self.name}: {self.domain.summary}, {len(self.theta)} with strokes, gauge {self.gauge}"
-            f"{', orthogonal' * self.orthogonal}{self._other_weights}"
+            f"{', orthogonal' * self.orthogonal}{self._other_weights}{self._prescribed}"
         )
+
+    @property
+    def _prescribed(self) -> str:
+        return "" if self.indices is None else f", prescribed indices: {len(self.indices)}"
 
     @property
     def _other_weights(self) -> str:
@@ -476,6 +507,8 @@ class Instance(Pictured):
             digest.update(b"orthogonal\n")
         if self.pair_weights is not None:
             digest.update(self.pair_weights.astype("<f8").tobytes())
+        if self.indices is not None:
+            digest.update(b"indices\n" + self.indices.astype("<i4").tobytes())
         return digest.hexdigest()
 
 

@@ -2,6 +2,7 @@
 
 Integers on a forest grown from the strokes are 0, which only chooses labels. All others may be real at first.
 Then the one nearest to a whole number is rounded, and angles are solved for again, until all are whole.
+Integers along rings of prescribed indices are known at first; the forest joins what they join.
 """
 
 from __future__ import annotations
@@ -9,6 +10,8 @@ from __future__ import annotations
 from typing import Final
 
 import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from ..instance.angles import HALF
 from ..instance.cycles import grow_forest
@@ -29,7 +32,7 @@ def round_greedily(energy: OrthogonalEnergy, is_over: IsOver = never) -> Ints:
     With more than 6,000 points a fifth of the open integers are rounded per factorisation, those nearest to
     whole numbers. Once time is over, all that are open are rounded.
     """
-    z, known = np.zeros(len(energy.first), dtype=np.int32), find_forest_rows(energy)
+    z, known = energy.with_sums(np.zeros(len(energy.first), dtype=np.int32)), find_forest_rows(energy)
     while not known.all():
         weight = np.where(known, energy.weight, 0.0)
         solve = factor_matrix(energy.weighted_matrix(weight), pull=0.0)
@@ -49,9 +52,9 @@ def round_greedily(energy: OrthogonalEnergy, is_over: IsOver = never) -> Ints:
                 break
             row = open_[chosen[0]]
             i, j, omega = energy.first[row], energy.second[row], energy.weight[row]
-            ends = np.zeros(energy.size)
+            ends = np.zeros(energy.size + 1)
             ends[i], ends[j] = 1.0, -1.0
-            column = np.append(solve(ends), 0.0) - columns @ (factors * (columns[i] - columns[j]))
+            column = np.append(solve(ends[:-1]), 0.0) - columns @ (factors * (columns[i] - columns[j]))
             factors[number] = omega / (1 + omega * (column[i] - column[j]))
             alpha -= factors[number] * (alpha[i] - alpha[j] + energy.constant[row] + HALF * z[row]) * column
             columns[:, number] = column
@@ -59,8 +62,16 @@ def round_greedily(energy: OrthogonalEnergy, is_over: IsOver = never) -> Ints:
 
 
 def find_forest_rows(energy: OrthogonalEnergy) -> Bools:
-    """Whether each row is a stroke or in the forest grown in breadth from the ground, (r,)."""
-    used, known = np.nonzero(energy.weight > 0)[0], energy.second == energy.size
-    forest = grow_forest(energy.size + 1, energy.first[used], energy.second[used], [energy.size])
+    """Whether each row is held, a stroke of a point in no held row, or in the forest, (r,).
+
+    The forest grows in breadth from the ground, between the points that held rows join.
+    """
+    size, held = energy.size + 1, energy.held
+    links = coo_array((held[held], (energy.first[held], energy.second[held])), shape=(size, size))
+    number = connected_components(links, directed=False)[1].astype(np.int32)
+    first, second, alone = number[energy.first], number[energy.second], np.bincount(number)[number] == 1
+    used = np.nonzero((energy.weight > 0) & (first != second))[0]
+    known = held | ((energy.second == energy.size) & alone[energy.first])
+    forest = grow_forest(number.max() + 1, first[used], second[used], [number[energy.size]])
     known[used[forest.pair[forest.pair >= 0]]] = True
     return np.asarray(known)

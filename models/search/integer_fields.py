@@ -58,6 +58,8 @@ def finish_field(instance: Instance, energy: OrthogonalEnergy, z: Ints, is_over:
     in turn.
     """
     field = field_of(instance, z, energy)
+    if instance.indices is not None:
+        return field  # within its windows and limits
     if have_energies_of_fields(instance):
         return fit_in_box(field, is_over)
     state = FreeField.of(field)

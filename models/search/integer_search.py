@@ -30,7 +30,9 @@ class IntegerSearch:
     def __init__(self, energy: OrthogonalEnergy, rings: Rings, starts: list[Ints], seed: int) -> None:
         """Begin at the lowest of the starts, which are integers (r,)."""
         self._energy, self._rings, self._seed = energy, rings, seed
-        self._starts = sorted((IntegerLandscape(energy, z) for z in starts), key=lambda land: -land.energy)
+        self._starts = sorted(
+            (IntegerLandscape(energy, z) for z in starts), key=lambda land: -land.bounded_energy
+        )
         self.best = self._present = self._starts.pop()
         self.round = self.fruitless = self._tired = 0
 
@@ -43,8 +45,9 @@ class IntegerSearch:
             if self._tired > _TIRED * self._energy.size:
                 self._present, self._tired = self._begin_again(rng, is_over), 0
             land = _explore(self._present, self._rings, rng, is_over)
-        self._tired = 0 if land.energy < lowered(self._present.energy) else self._tired + _KICKS
-        self.fruitless = 0 if land.energy < lowered(self.best.energy) else self.fruitless + _KICKS
+        total = land.bounded_energy
+        self._tired = 0 if total < lowered(self._present.bounded_energy) else self._tired + _KICKS
+        self.fruitless = 0 if total < lowered(self.best.bounded_energy) else self.fruitless + _KICKS
         self._present = land
         self.best = self.best if self.fruitless else land
         self.round += not is_over()
@@ -77,5 +80,6 @@ def _explore(
     """The lowest landscape of 500 perturbations; rings: of the rows."""
     if not len(land.p):
         return land
-    perturbations = Perturbations(rings, land.terms.size, land.terms.first, land.terms.second)
-    return explore_from(land, perturbations, rng, least=land.energy, count=_KICKS, is_over=is_over)[0] or land
+    terms, least = land.terms, land.bounded_energy
+    perturbations = Perturbations(rings, terms.size, terms.first, terms.second, terms.keeps_sums)
+    return explore_from(land, perturbations, rng, least=least, count=_KICKS, is_over=is_over)[0] or land

@@ -125,6 +125,11 @@ class Landscape:
         return FieldPoint(self.defined_energy(inside), self._with_patch(inside), self.p.copy())
 
     @property
+    def to_beat(self) -> float:
+        """The energy that a walk has to lower."""
+        return self.energy
+
+    @property
     def bounded_energy(self) -> float:
         """The energy by definition of the field within its bounds."""
         return self.point.energy
@@ -333,8 +338,10 @@ class IntegerLandscape:
 
     @property
     def bounded_energy(self) -> float:
-        """The energy; no angle has bounds."""
-        return self.energy
+        """The energy by definition: no angle has bounds, residuals have limits with prescribed indices."""
+        return self.energy if self.terms.sums is None else self.terms.least_total(self.p)
+
+    to_beat = bounded_energy
 
     @property
     def offsets(self) -> Floats:

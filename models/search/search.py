@@ -172,15 +172,15 @@ def _search_integers(
     kind = "energy" if is_exact else "energy with right angles"
     if not is_exact:
         fields.append(finish_field(instance, energy, hunt.best.p, sooner))
-    energies = [(0, hunt.best.energy if is_exact else min(field.energy().total for field in fields))]
+    energies = [(0, hunt.best.bounded_energy if is_exact else min(field.energy().total for field in fields))]
     while not (ended := ends.reason_to_end(hunt.round)):
         if hunt.fruitless > _PATIENCE * energy.size:
             ended = "patience"
             break
         hunt.explore(ends.is_over)
-        if is_exact and hunt.best.energy < energies[-1][1]:
-            energies.append((hunt.round, hunt.best.energy))
-        progress(f"{kind} {hunt.best.energy:.5g} after {hunt.round} rounds")
+        if is_exact and hunt.best.bounded_energy < energies[-1][1]:
+            energies.append((hunt.round, hunt.best.bounded_energy))
+        progress(f"{kind} {hunt.best.bounded_energy:.5g} after {hunt.round} rounds")
     fields.append(finish_field(instance, energy, hunt.best.p, closing()))
     return _result(min(fields, key=rounded_energy), hunt.round, energies, ended)
 

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import crossfield as cf
 import numpy as np
@@ -12,13 +13,14 @@ from crossfield.export.solvers_table import SOLVERS, suitability_in_format
 from crossfield.export.solving.local import SolveFiles, Solvers, choose_format
 from crossfield.export.verify.verify import attained_objective
 from crossfield.export.writing.nl_order import NlOrder
+from crossfield.models.field.triangles import singular_vertices
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.processes.deadline import Deadline
 from folders import contents
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from independent_energy import Formulas
-from instance_kinds import SMALL, TINY, crossed, instances, kind, on_mesh
+from instance_kinds import SMALL, TINY, crossed, instances, kind
 
 LEAST = 1e-9
 """Least size of a number in a file: readers of files drop smaller ones."""
@@ -78,20 +80,16 @@ def field_with_any_jumps(instance):
 
 
 def with_indices_of(field, formulation):
-    """The problem whose rings have the indices of a field; none on pixels, which have no such vertices."""
-    if not on_mesh(field.instance):
-        with pytest.raises(cf.CrossfieldError, match=r"works on meshes only|gauge"):
-            cf.formulate(field.instance, formulation, indices=[(0, 0)])
-        return []
-    indices = dict.fromkeys(field.instance.mesh.ring_vertices.tolist(), 0)
-    spots = field.singularities
-    indices |= dict(zip(spots.vertex.tolist(), np.round(4 * spots.index).astype(int).tolist(), strict=True))
-    return [cf.formulate(field.instance, formulation, indices=indices.items())]
+    """The problem whose rings have the indices of a field."""
+    indices = dict.fromkeys(field.instance.domain.ring_vertices.tolist(), 0)
+    vertex, index = singular_vertices(field)
+    indices |= dict(zip(vertex.tolist(), np.round(4 * index).astype(int).tolist(), strict=True))
+    return cf.formulate(replace(field.instance, indices=[*indices.items()]), formulation)
 
 
 def variants(name, formulation):
-    """The problems of a formulation with its default options, then with each other value of each option, and
-    the field of the instance.
+    """The problems of a formulation with its default options, with each other value of each option, and with
+    prescribed indices; and the field of the instance.
     """
     problem, field = problem_of(name, formulation)
     if problem is None:
@@ -100,10 +98,7 @@ def variants(name, formulation):
         field = field_with_any_jumps(kind(name))
         problem, _ = problem_of(name, formulation, field=field)
     problems = [problem]
-    for option in sorted(FORMULATIONS[formulation].option_names, key=lambda name: (name == "indices", name)):
-        if option == "indices":
-            problems += with_indices_of(field, formulation)
-            continue
+    for option in sorted(FORMULATIONS[formulation].option_names):
         if option == "limits":
             if kind(name).gauge == "box":
                 with pytest.raises(cf.FormulationError, match="gauge"):
@@ -111,6 +106,8 @@ def variants(name, formulation):
                 continue
             field = cf.improved_field(field)  # limits cut off fields that one jump improves
         problems += [problem_of(name, formulation, **{option: value})[0] for value in CHOICES[option]]
+    if "cycle" in formulation and len(field.instance.domain.ring_vertices):
+        problems.append(with_indices_of(field, formulation))
     return problems, field
 
 
@@ -118,6 +115,7 @@ def variants(name, formulation):
 def test_a_field_is_a_point_with_its_energy(name, formulation):
     problems, field = variants(name, formulation)
     for problem in problems:
+        field = replace(field, instance=problem.instance)
         point, energy = problem.point(field), energy_of(problem, field)
         close = 1e-9 * (1 + energy) + 1e-11 * sum(Formulas(field.instance).omega)
         fixed = problem.with_integers_fixed(field)
@@ -164,6 +162,7 @@ def test_a_hash_stands_for_everything_that_changes_a_file(formulation):
     problems, field = variants(name, formulation)
     defaults = FORMULATIONS[formulation].defaults
     distinct = [problems[0], *(other for other in problems if other.formulation.options != defaults)]
+    distinct += [other for other in problems if other.instance.indices is not None]
     if formulation != "qp-fixed":
         distinct.append(problems[0].with_integers_fixed(field))
         other = cf.CrossField(field.instance, field.alpha, field.beta, field.p + 1)

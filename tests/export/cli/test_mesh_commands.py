@@ -102,27 +102,32 @@ def test_singularities_of_a_file_are_prescribed_in_models_and_kept_by_answers(tm
     top = instance.mesh.vertices.tolist().index([0.5, 0.5, 1])
     rows = [f"{corners[0]} 0", f"{top} 1", *(f"{corner} 1" for corner in corners[1:])]
     Path("wanted.sings").write_text("\n".join(["4 9", *rows]) + "\n")
-    for folder in ("out", "again"):
-        assert invoke(["export", "i.json", "--indices", "wanted.sings", "-o", folder]) == 0
+    assert invoke(["instance", "i.json", "--indices", "wanted.sings", "-o", "part.json"]) == 0
+    assert invoke(["instance", "part.json", "-o", "again.npz"]) == 0
+    assert cf.read_instance("again.npz").sha256 == cf.read_instance("part.json").sha256 != instance.sha256
+    assert invoke(["export", "part.json", "-o", "out"]) == 0
     assert [path.name for path in sorted(Path("out").glob("*.lp"))] == [
         "cube.milp-cycle.lp",
         "cube.miqp-cycle.lp",
     ]
-    assert all(
-        path.read_bytes() == (Path("again") / path.name).read_bytes() for path in Path("out").glob("c*")
-    )
     assert invoke(["verify", "out", "-p", "highs", "-p", "casadi"]) == 0
     problem = cf.read_manifest("out/cube.milp-cycle.manifest.json").problem()
-    field = cf.solve(problem, "highs").field
-    cf.write_field(field, "field.rawfield")
-    written = Path("field.sings").read_text().splitlines()
-    assert {*rows[1:]} <= {*written[1:]}
-    assert not any(row.startswith(f"{corners[0]} ") for row in written[1:])
+    cf.write_field(cf.solve(problem, "highs").field, "solved.rawfield")
+    limit = ["--time-limit", "1", "-o"]
+    assert invoke(["solve", "part.json", "-m", "search", *limit, "searched"]) == 0
+    for number, path in enumerate(Path().glob("*/*.field.npz")):
+        cf.write_field(cf.read_field(path), f"{number}.rawfield")
+    for path in ("solved", "0"):
+        written = Path(f"{path}.sings").read_text().splitlines()
+        assert {*rows[1:]} <= {*written[1:]}
+        assert not any(row.startswith(f"{corners[0]} ") for row in written[1:])
+        assert cf.read_field(f"{path}.rawfield", on=problem.instance)
     capsys.readouterr()
     for text, message in (("4 1\n", "4 0, the number"), ("5 0\n", "4 0"), ("4 1\n3 x\n", "line 2")):
         Path("wrong.sings").write_text(text)
-        assert invoke(["export", "i.json", "--indices", "wrong.sings", "-o", "wrong"]) == 1
+        assert invoke(["instance", "i.json", "--indices", "wrong.sings", "-o", "wrong.json"]) == 1
         assert message in capsys.readouterr().err
-    refused = ["export", "i.json", "-f", "milp", "--indices", "wanted.sings", "-o", "wrong"]
-    assert invoke(refused) == 1
-    assert "milp-mccormick has no option indices" in capsys.readouterr().err
+    assert invoke(["export", "part.json", "-f", "milp", "-o", "wrong"]) == 1
+    assert "lets vertices have any index" in capsys.readouterr().err
+    assert invoke(["solve", "part.json", "-m", "power", "-o", "wrong"]) == 1
+    assert "prescribed indices; use greedy, search, prove" in capsys.readouterr().err

@@ -8,6 +8,7 @@ import pytest
 from bounded_least_squares import least_in_bounds
 from crossfield.export.programs import highs
 from crossfield.export.programs.comparison import algebra_difference
+from crossfield.models.formulations.choice import list_formulations
 from crossfield.models.formulations.residuals import limit_residuals
 from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.terms import parity_sign
@@ -144,14 +145,33 @@ def test_the_best_of_all_indices_of_a_vertex_is_the_optimum(name):
     energies = {}
     for turns in range(-1, 4):
         try:
-            problem = cf.formulate(instance, "milp-cycle", indices=[(vertex, turns)])
-        except cf.FormulationError:  # residuals of at most pi/4 do not reach it
+            problem = cf.formulate(replace(instance, indices=[(vertex, turns)]), "milp-cycle")
+        except cf.InstanceError:  # residuals of at most pi/4 do not reach it
             continue
         solution = cf.solve(problem, "highs", limits=cf.Limits(60.0, gap=1e-9))
         assert indices_of(solution.field).get(vertex, 0) == turns
         energies[turns] = solution.objective
     assert energies[indices_of(free.field).get(vertex, 0)] == pytest.approx(free.objective, abs=1e-6)
     assert min(energies.values()) == pytest.approx(free.objective, abs=1e-6)
+
+
+@pytest.mark.needs("gurobi")
+@pytest.mark.parametrize(
+    "name, count", [("tetrahedron", 2), ("cube", 5), ("torus with strokes", 4), ("grid", 3)]
+)
+def test_searches_find_the_least_energy_with_given_indices(name, count):
+    """Far from those of the free optimum; on the first two, residuals are at their limits."""
+    instance, rng = INSTANCES[name](), np.random.default_rng(1)
+    vertices, defect = instance.domain.ring_vertices, instance.domain.rings.defect
+    some = rng.choice(len(vertices), count, replace=False)
+    wanted = np.round(defect[some] / HALF).astype(int) + rng.integers(-1, 2, count)
+    instance = replace(instance, indices=np.stack([vertices[some], wanted], axis=1))
+    least = cf.solve(cf.formulate(instance, "miqp-cycle"), "gurobi", limits=cf.Limits(60.0, gap=1e-9))
+    field = cf.search(instance, rounds=2).field
+    field.check_instance(instance)
+    assert field.energy().total == pytest.approx(least.objective, rel=1e-6)
+    with pytest.raises(cf.InstanceError, match=r"has index .*/4 at vertex .* is prescribed"):
+        cf.search(instance, rounds=0, start=cf.power_field(instance))
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -162,42 +182,55 @@ def test_fields_with_given_indices_have_the_energy_of_charges(seed):
     corners = icosahedron().vertices + np.random.default_rng(seed).uniform(-0.2, 0.2, (12, 3))
     mesh = mesh_of(corners, icosahedron().faces)
     weights = np.random.default_rng(seed).uniform(0.5, 2, len(mesh.first))
-    instance = part(mesh, [], pair_weights=weights)
-    indices = dict.fromkeys(range(12), 0) | indices_of(cf.search(instance, rounds=1).field)
+    indices = dict.fromkeys(range(12), 0) | indices_of(cf.power_field(part(mesh, [])))
+    instance = part(mesh, [], pair_weights=weights, indices=[*indices.items()])
     edges = np.eye(12)[mesh.pair_vertices[:, 0]] - np.eye(12)[mesh.pair_vertices[:, 1]]
     charges = np.array(list(indices.values())) - 2 * mesh.defect / np.pi
     potential = np.linalg.lstsq(edges.T @ (edges / weights[:, None]), charges, rcond=None)[0]
-    problem = cf.formulate(instance, "miqp-cycle", indices=indices.items(), relax=True)
-    solution = cf.solve(problem, "highs")
+    solution = cf.solve(cf.formulate(instance, "miqp-cycle", relax=True), "highs")
     assert solution.objective == pytest.approx(np.pi**2 / 2 * charges @ potential, rel=1e-6)
-    assert {v: q for v, q in indices.items() if q} == indices_of(solution.field)
+    searched = cf.search(instance, rounds=0).field
+    assert searched.energy().total == pytest.approx(solution.objective, rel=1e-6)
+    for field in (solution.field, searched):
+        assert {v: q for v, q in indices.items() if q} == indices_of(field)
 
 
 @for_each(
     "name,indices,message",
     [
-        ("grid", [(0, 0)], "works on meshes only"),
+        ("grid", [(0, 0)], "vertex 0 has no index: it is on the boundary or in no pixel"),
         ("sheet", [(0, 0)], "vertex 0 has no index: it is on the boundary"),
         ("sheet", [(99, 0)], "vertex 99 has no index"),
-        ("sheet", [(4, 0), (4, 1)], "list a vertex twice"),
-        ("sheet", [(4, 0.25)], "no pairs of a vertex and four times its index"),
-        ("sheet", [4, 5], "no pairs of a vertex"),
+        ("sheet", [(4, 0), (4, 1)], "list vertex 4 twice"),
+        ("sheet", [(4, 0.25)], "whole numbers"),
+        ("sheet", [4, 5], "give pairs of a vertex"),
         (
             "sheet",
             [(4, 3)],
             "vertex 4 cannot have the index 3/4: with residuals of at most pi/4 it is -2/4 to 2",
         ),
-        ("cube", [(vertex, 1 + (vertex == 3)) for vertex in range(8)], "add up to 9/4 instead of 8/4"),
+        (
+            "cube",
+            [(vertex, 1 + (vertex == 3)) for vertex in range(8)],
+            "closed part with face 0 add up to 9/4 instead of 8/4",
+        ),
     ],
 )
 def test_indices_that_no_field_has_are_refused(name, indices, message):
-    for formulation in ("miqp-cycle", "milp-cycle"):
-        with pytest.raises(cf.CrossfieldError, match=message):
-            cf.formulate(INSTANCES[name](), formulation, indices=indices)
-    with pytest.raises(cf.FormulationError, match="limits hold where every jump may change"):
-        cf.formulate(INSTANCES["sheet"](), "miqp-cycle", indices=[(4, 0)], limits=True)
-    with pytest.raises(cf.FormulationError, match="has no option indices"):
-        cf.formulate(INSTANCES["sheet"](), "miqp-orthogonal", indices=[(4, 0)])
+    with pytest.raises(cf.InstanceError, match=message):
+        replace(INSTANCES[name](), indices=indices)
+
+
+def test_what_cannot_prescribe_indices_refuses_them():
+    instance = replace(INSTANCES["sheet"](), indices=[(4, 0)])
+    assert list_formulations(instance) == ["miqp-cycle", "milp-cycle"]
+    with pytest.raises(cf.FormulationError, match="limits only where every jump may change"):
+        cf.formulate(instance, "miqp-cycle", limits=True)
+    with pytest.raises(cf.FormulationError, match="choose miqp-cycle or milp-cycle"):
+        cf.formulate(instance, "miqp-orthogonal")
+    for change in ({"orthogonal": False}, {"gauge": "box"}):
+        with pytest.raises(cf.InstanceError, match="orthogonal crosses under the gauge strokes only"):
+            replace(instance, **change)
 
 
 @for_each("name", INSTANCES)
