@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from ...models.instance.angles import line_difference
-from ...models.instance.domain import Floats
+from ...models.instance.domain import Floats, Ints
 from ...models.sketch.cover import CUT, cover_by_segments, fit_frame
 from ...models.sketch.outline import find_inside
 from .document import Document
@@ -17,6 +17,7 @@ NextStep = Literal["outline", "line", "across", ""]
 
 _SIZE: Final = 48  # pixels of the longer side of the grid that decides, for fields of every size
 _NEAR: Final = 1.5  # pixels between two lines that meet
+_CROWD: Final = 4  # points of one direction in a pixel: more of them meet nothing else
 _APART: Final = np.radians(30)  # least angle between lines of two families; strokes tremble by less
 
 
@@ -50,11 +51,22 @@ def _do_lines_meet(lines: list[Floats]) -> bool:
         return False
     lines = [_resample(line) for line in lines]
     owner = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
+    points = np.concatenate(lines)
     right, down = np.concatenate([np.gradient(line, axis=0) for line in lines]).T
-    direction = np.arctan2(down, right)
-    first, second = KDTree(np.concatenate(lines)).query_pairs(_NEAR, output_type="ndarray").T
+    direction = np.arctan2(down, right) % np.pi
+    kept = _thin_crowds(np.column_stack([points, direction / _APART * 3]))
+    points, owner, direction = points[kept], owner[kept], direction[kept]
+    first, second = KDTree(points).query_pairs(_NEAR, output_type="ndarray").T
     apart = line_difference(direction[first], direction[second]) > _APART
     return bool((apart & (owner[first] != owner[second])).any())
+
+
+def _thin_crowds(values: Floats) -> Ints:
+    """Numbers of rows, all but those with _CROWD others before them in the same unit cell."""
+    cell = np.unique(np.floor(values), axis=0, return_inverse=True)[1]
+    order = np.argsort(cell, kind="stable")
+    rank = np.arange(len(order)) - np.searchsorted(cell[order], cell[order])
+    return order[rank < _CROWD].astype(np.int32)
 
 
 def _resample(line: Floats) -> Floats:

@@ -192,7 +192,7 @@ class Page:
                 view, drawn, field = self.desk.submit("fields", field_step, data, COARSE, stop=stop).result()
                 yield view
                 early = self.desk.submit(
-                    "surfaces", surface_step, data, drawn, field, stop=lambda: stop() or fine.is_set()
+                    "surfaces", surface_step, drawn, field, stop=lambda: stop() or fine.is_set()
                 )
         finer = self.desk.submit("fields", field_step, data, stop=stop)
         if early is not None:
@@ -202,7 +202,7 @@ class Page:
         view, drawn, field = finer.result()
         fine.set()
         yield view
-        surface = self.desk.submit("surfaces", surface_step, data, drawn, field, stop=stop)
+        surface = self.desk.submit("surfaces", surface_step, drawn, field, stop=stop)
         if lines:
             yield self.desk.submit("fields", lines_step, field, stop=stop).result()
         yield surface.result()

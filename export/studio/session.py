@@ -48,11 +48,12 @@ class OvertakenError(CrossfieldError):
 
 @dataclass(frozen=True, eq=False)
 class DrawnInstance:
-    """An instance, the kind (h, w) of each pixel, and its strokes.
+    """An instance of a document, the kind (h, w) of each pixel, and its strokes.
 
     strokes: number of the stroke and of the stroke pixel for each pair of them, (k, 2).
     """
 
+    document: Document
     instance: Instance
     kinds: Ints
     strokes: Ints
@@ -88,7 +89,7 @@ def read_drawn(document: Document, size: int | None = None) -> DrawnInstance:
     pairs = np.stack([owner, number[row, column]], axis=1)
     pairs = pairs[pairs[:, 1] >= 0].astype(np.int32)
     kinds = np.select([covers.cuts, mask, left_out], [STROKE, IN, LEFT_OUT], OUT).astype(np.int32)
-    return DrawnInstance(_scale_weights(instance, document.weights, pairs), kinds, pairs)
+    return DrawnInstance(document, _scale_weights(instance, document.weights, pairs), kinds, pairs)
 
 
 def _read_source(source: Source) -> Drawing:

@@ -10,7 +10,6 @@ import numpy as np
 from ...models.field.field import FAR, CrossField
 from ...models.instance.instance import Instance
 from ...models.processes.child_program import is_stopped
-from ...models.surface.surface import Surface
 from ...models.surface.trust import OFF, UNFIT, right_angle_deviation
 from ..pictures.draw import count_singularities
 from ..pictures.marks import split_runs
@@ -41,9 +40,8 @@ def encode_array(values: np.ndarray[Any, Any], kind: str) -> str:
 
 def field_step(data: bytes, size: int | None = None) -> tuple[dict[str, Any], DrawnInstance, CrossField]:
     """Instance and field of a document, and what the page shows of them. Raises InputError."""
-    document = Document.from_bytes(data)
-    drawn, field = compute_field(document, size)
-    return _field_view(document, drawn, field), drawn, field
+    drawn, field = compute_field(Document.from_bytes(data), size)
+    return _field_view(drawn, field), drawn, field
 
 
 def next_step(data: bytes) -> dict[str, Any]:
@@ -51,14 +49,13 @@ def next_step(data: bytes) -> dict[str, Any]:
     return {"next": find_next_step(Document.from_bytes(data))}
 
 
-def _field_view(document: Document, drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
+def _field_view(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     instance, (x, y), spots = drawn.instance, drawn.instance.origin, field.singularities
     pixel = instance.pixel_size
     shape, deviation = field.shape, field.stroke_deviation
     return {
         "stage": "field",
         "size": max(instance.mask.shape),
-        "wanted": document.size,
         "frame": {"x": x, "y": y, "pixel": pixel, "rows": len(drawn.kinds), "columns": drawn.kinds.shape[1]},
         "kinds": encode_array(drawn.kinds, "u1"),
         "warnings": list(instance.reading.warnings) if instance.reading else [],
@@ -72,7 +69,7 @@ def _field_view(document: Document, drawn: DrawnInstance, field: CrossField) -> 
             )
         ],
         "suspects": _find_suspects(drawn, deviation > FAR),
-        "next": find_next_step(document),
+        "next": find_next_step(drawn.document),
         "numbers": {
             "pixels": instance.grid.size,
             "strokes": len(instance.theta),
@@ -112,14 +109,10 @@ def lines_step(field: CrossField) -> dict[str, Any]:
     return {"stage": "lines", "size": max(field.instance.mask.shape), "families": families}
 
 
-def surface_step(data: bytes, drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
+def surface_step(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     """The data of the surface of a field for the page."""
-    document = Document.from_bytes(data)
-    return _surface_view(document, drawn, compute_surface(document, field))
-
-
-def _surface_view(document: Document, drawn: DrawnInstance, lifted: Surface) -> dict[str, Any]:
-    instance, field = lifted.instance, lifted.field
+    document, instance = drawn.document, drawn.instance
+    lifted = compute_surface(document, field)
     view = _view_on_page(document, instance)
     bands = [part for _, part in raster_surface(lifted, compute_outline(document, instance), view)]
     normals = np.concatenate([part.normals[..., :2] for part in bands])

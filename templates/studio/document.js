@@ -18,6 +18,14 @@ export function check(doc) {
   return doc;
 }
 
+const texts = new WeakMap(); // of strokes
+function textOf(stroke) {
+  if (!texts.has(stroke)) texts.set(stroke, JSON.stringify(stroke));
+  return texts.get(stroke);
+}
+/** A document as JSON without some of its parts. The text of a stroke is made once. */
+export const textWithout = (doc, parts) => `${JSON.stringify({ ...doc, ...Object.fromEntries(parts.map(part => [part, undefined])), strokes: undefined }).slice(0, -1)},"strokes":[${doc.strokes.map(textOf)}]}`;
+
 /** All documents so far, without limit; unchanged parts are shared between them. saved: those that are in a file. */
 export class History {
   constructor(first) { this.reset(first); }
@@ -28,5 +36,9 @@ export class History {
   can(by) { return this.all[this.at + by] !== undefined; }
 }
 
-const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0));
+function bytes(text) {
+  const letters = atob(text), all = new Uint8Array(letters.length);
+  for (let k = 0; k < all.length; k++) all[k] = letters.charCodeAt(k);
+  return all;
+}
 export const decoded = { bytes, shorts: text => new Int16Array(bytes(text).buffer), floats: text => new Float32Array(bytes(text).buffer) };

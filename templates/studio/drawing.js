@@ -17,7 +17,7 @@ export const colours = () => COLOURS[dark.matches ? "dark" : "light"];
 export class View {
   constructor(canvas, changed) {
     this.canvas = canvas; this.box = [0, 0, 1, 1]; this.zoomed = false; this.cursor = null;
-    this.base = document.createElement("canvas");
+    this.base = document.createElement("canvas"); this.ink = document.createElement("canvas");
     new ResizeObserver(() => { this.resize(); changed(); }).observe(canvas);
     dark.addEventListener("change", changed);
     this.resize();
@@ -25,7 +25,8 @@ export class View {
   resize() {
     this.ratio = devicePixelRatio || 1;
     this.wide = Math.max(1, this.canvas.clientWidth); this.high = Math.max(1, this.canvas.clientHeight);
-    for (const each of [this.canvas, this.base]) { each.width = this.wide * this.ratio; each.height = this.high * this.ratio; }
+    for (const each of [this.canvas, this.base, this.ink]) { each.width = this.wide * this.ratio; each.height = this.high * this.ratio; }
+    this.inked = null;
     if (!this.zoomed) this.fit(this.box);
   }
   fit(box) {
@@ -44,13 +45,19 @@ export class View {
     const place = this.canvas.getBoundingClientRect();
     return [(event.clientX - place.left - this.x) / this.scale, (event.clientY - place.top - this.y) / this.scale];
   }
-  begin(target) {
+  begin(target, ...layers) {
     const context = target.getContext("2d");
     context.setTransform(1, 0, 0, 1, 0, 0); context.clearRect(0, 0, target.width, target.height);
+    layers.forEach(layer => context.drawImage(layer, 0, 0));
+    return this.place(context);
+  }
+  place(context) {
     context.setTransform(this.ratio * this.scale, 0, 0, this.ratio * this.scale, this.ratio * this.x, this.ratio * this.y);
     context.lineCap = context.lineJoin = "round";
     return context;
   }
+  /** Left, top, right and bottom of the part of the drawing that is seen. */
+  get seen() { return [-this.x / this.scale, -this.y / this.scale, (this.wide - this.x) / this.scale, (this.high - this.y) / this.scale]; }
   drawCursor(context) {
     if (!this.cursor || document.activeElement !== this.canvas) return;
     const [x, y] = this.cursor, arm = 9 / this.scale;
@@ -88,6 +95,25 @@ export function drawInk(context, strokes, colour, width) {
   }
   context.strokeStyle = colour;
   paths.forEach((path, level) => { if (path) { context.lineWidth = width * shareOf(level / LEVELS); context.stroke(path); } });
+}
+
+/** Strokes in the colours of their marks, on a canvas of their own; strokes that were added are drawn onto those before.
+ * widths: in pixels of the screen, by mark; strokes of other marks are left out. */
+export function inkOf(view, strokes, widths) {
+  const key = [view.x, view.y, view.scale, dark.matches].join(), { inked } = view;
+  const isLonger = inked?.key === key && inked.strokes.every((stroke, k) => stroke === strokes[k]);
+  const context = isLonger ? view.place(view.ink.getContext("2d")) : view.begin(view.ink), [left, top, right, bottom] = view.seen, thin = 1 / view.scale;
+  for (let k = isLonger ? inked.strokes.length : 0, first = k; k < strokes.length; first = k) {
+    const { mark } = strokes[first], run = [];
+    for (; strokes[k]?.mark === mark; k++) {
+      const box = boxOf(strokes[k]);
+      if (box[2] >= left && box[0] <= right && box[3] >= top && box[1] <= bottom) run.push(strokes[k]);
+    }
+    context.setLineDash(mark === "ignored" ? [4 * thin, 4 * thin] : []);
+    if (widths[mark]) drawInk(context, run, colours()[mark], widths[mark] * thin);
+  }
+  view.inked = { key, strokes };
+  return view.ink;
 }
 
 /** A small picture with a pixel per pixel of the grid. */
@@ -144,11 +170,11 @@ function crosses(context, field, scale) {
   }
 }
 
-/** Draws everything that changes with the document, the field and the view, into the hidden canvas. */
+/** Draws what lies under the strokes, and changes with the document, the field and the view, into the hidden canvas. */
 export function paintBase(view, { doc, picture, opacity, chosen, field, lines, mode, suspects }) {
   const context = view.begin(view.base), thin = 1 / view.scale, ink = colours();
-  const left = -view.x / view.scale, top = -view.y / view.scale, wide = view.wide / view.scale, high = view.high / view.scale;
-  context.fillStyle = ink.beyond; context.fillRect(left, top, wide, high); context.clearRect(...doc.page);
+  const [left, top, right, bottom] = view.seen;
+  context.fillStyle = ink.beyond; context.fillRect(left, top, right - left, bottom - top); context.clearRect(...doc.page);
   if (picture && opacity) { context.globalAlpha = opacity; context.drawImage(picture, ...doc.page); context.globalAlpha = 1; }
   context.strokeStyle = ink.page; context.lineWidth = thin; context.strokeRect(...doc.page);
   if (field) {
@@ -164,32 +190,21 @@ export function paintBase(view, { doc, picture, opacity, chosen, field, lines, m
     });
     context.globalAlpha = 1;
   }
-  const seen = doc.strokes.map((stroke, number) => ({ stroke, number })).filter(({ stroke }) => {
-    const box = boxOf(stroke);
-    return box[2] >= left && box[0] <= left + wide && box[3] >= top && box[1] <= top + high;
-  });
-  const drawn = some => seen.filter(some).map(({ stroke }) => stroke);
-  draw(context, drawn(({ number }) => suspects.has(number)), ink.suspect, 11 * thin);
-  draw(context, drawn(({ number }) => chosen.has(number)), ink.chosen, 9 * thin);
-  for (const mark of ["ignored", "cut", "line"]) {
-    context.setLineDash(mark === "ignored" ? [4 * thin, 4 * thin] : []);
-    drawInk(context, drawn(({ stroke }) => stroke.mark === mark), ink[mark], (mark === "ignored" ? 1.4 : 2.6) * thin);
-  }
-  context.setLineDash([]);
-  if (!field) return;
-  if (mode !== "none") for (const [x, y, index] of field.singularities) {
+  draw(context, [...suspects].flatMap(k => doc.strokes[k] ?? []), ink.suspect, 11 * thin);
+  draw(context, [...chosen].map(k => doc.strokes[k]), ink.chosen, 9 * thin);
+}
+
+const WIDTHS = { ignored: 1.4, cut: 2.6, line: 2.6 };
+
+/** Copies the hidden canvases and draws what follows the pointer. live: the tool in use, with what it has done so far. */
+export function paint(view, { live, brush, doc, chosen, field, mode }) {
+  const isStill = (_, k) => !live?.shift || !chosen.has(k), ink = colours(), thin = 1 / view.scale;
+  const context = view.begin(view.canvas, view.base, inkOf(view, doc.strokes.filter(isStill), WIDTHS));
+  for (const stroke of doc.strokes.filter((_, k) => !isStill(_, k))) drawInk(context, [stroke], ink[stroke.mark], WIDTHS[stroke.mark] * thin);
+  if (field && mode !== "none") for (const [x, y, index] of field.singularities) {
     context.fillStyle = index > 0 ? ink.plus : ink.minus;
     context.beginPath(); context.arc(x, y, 5 * thin, 0, 7); context.fill();
   }
-}
-
-/** Copies the hidden canvas and draws what follows the pointer. live: the tool in use, with what it has done so far. */
-export function paint(view, { live, brush, doc }) {
-  const context = view.canvas.getContext("2d"), ink = colours();
-  context.setTransform(1, 0, 0, 1, 0, 0); context.clearRect(0, 0, view.canvas.width, view.canvas.height);
-  context.drawImage(view.base, 0, 0);
-  context.setTransform(view.ratio * view.scale, 0, 0, view.ratio * view.scale, view.ratio * view.x, view.ratio * view.y);
-  context.lineCap = context.lineJoin = "round";
   if (live?.tool === "draw") {
     const points = live.path.length > 2 ? live.path : [...live.path, ...live.path];
     context.save(); context.beginPath(); context.rect(...doc.page); context.clip();

@@ -1,6 +1,6 @@
 // The page: tools, keys, requests. The document lives here; the server computes functions of it.
 
-import { History, check, decoded, emptyDocument } from "./document.js";
+import { History, check, decoded, emptyDocument, textWithout } from "./document.js";
 import { View, paint, paintBase } from "./drawing.js";
 import { listen, watchPen } from "./pointer.js";
 import { Server, lined, sentence, trouble } from "./server.js";
@@ -26,9 +26,10 @@ function refresh(base = true) {
   asked = true;
   requestAnimationFrame(() => {
     asked = false;
-    if (dirty) paintBase(left, { ...state, doc: state.live?.shift ? shifted(state.live) : state.doc, picture: picture(), opacity: Number($("#opacity").value) });
+    const seen = { ...state, doc: state.live?.shift ? shifted(state.live) : state.doc };
+    if (dirty) paintBase(left, { ...seen, picture: picture(), opacity: Number($("#opacity").value) });
     dirty = false;
-    paint(left, state);
+    paint(left, seen);
     paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked && isDetermined(), strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
   });
 }
@@ -89,11 +90,10 @@ function picture() {
 const isSaved = () => state.history.saved.has(state.history.now);
 
 // What survives a reload of the page. The large parts change rarely: they are stored apart. Computing needs the source of unchanged strokes.
-const strokesOnly = doc => JSON.stringify({ ...doc, ...Object.fromEntries(PARTS.map(part => [part, undefined])) });
 const strokesOf = new WeakMap();
 const computable = doc => {
   const { source } = doc, changed = strokesOf.has(source) && strokesOf.get(source) !== doc.strokes;
-  return JSON.stringify({ ...doc, file: undefined, picture: undefined, source: changed ? undefined : source });
+  return textWithout(doc, ["file", "picture", ...changed ? ["source"] : []]);
 };
 const stored = new Map();
 function store(name, value, text = String) {
@@ -104,7 +104,7 @@ function store(name, value, text = String) {
 function keep() {
   const { now } = state.history, whole = PARTS.map(part => store(`${KEPT}-${part}`, now[part], JSON.stringify)).every(Boolean);
   store(`${KEPT}-at`, location.pathname); store(`${KEPT}-saved`, isSaved() && "yes");
-  if (!store(KEPT, now, strokesOnly)) banner("This drawing is too large to survive a reload of this page. Save it as a file.", { kind: "large" });
+  if (!store(KEPT, now, doc => textWithout(doc, PARTS))) banner("This drawing is too large to survive a reload of this page. Save it as a file.", { kind: "large" });
   else if (!whole) banner("A reload of this page keeps the strokes, but not the picture or file that they come from, which is too large. Save the drawing.", { kind: "large" });
 }
 function kept() {

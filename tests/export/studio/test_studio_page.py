@@ -166,7 +166,7 @@ def test_a_picture_lies_under_its_traced_strokes(empty, tmp_path):
 SHOWN = """
 const draw = CanvasRenderingContext2D.prototype.drawImage;
 CanvasRenderingContext2D.prototype.drawImage = function(image, ...box) {
-  if (this.canvas.id === "surface") window.shown = [image.toDataURL(), box];
+  if (this.canvas.id === "surface" && box.length === 4) window.shown = [image.toDataURL(), box];
   return draw.call(this, image, ...box);
 };
 """
@@ -203,6 +203,23 @@ def test_the_preview_is_the_picture_that_shade_writes(empty, tmp_path, content):
     assert opaque.mean() > 0.2
     assert off[..., 3].max() == 0
     assert off[opaque].max() <= 1
+
+
+DRAWN = """
+const line = Path2D.prototype.lineTo;
+window.drawn = 0;
+Path2D.prototype.lineTo = function (...to) { window.drawn += 1; return line.apply(this, to); };
+"""
+"""Counts the parts of strokes that are painted."""
+
+
+def test_a_stroke_more_paints_none_of_the_others_again(empty, tmp_path):
+    lines = [{"points": [10, y / 4, 60, y / 4 + 2, 110, y / 4], "mark": "line"} for y in range(48, 352)]
+    browser = pebble(empty, tmp_path, strokes=[*PEBBLE["strokes"], *lines])
+    browser.execute_script(DRAWN)
+    drag(browser, [(100 + 20 * k, 300) for k in range(8)])
+    assert len(document(browser)["strokes"]) == 3 + len(lines) + 1
+    assert 0 < browser.execute_script("return window.drawn") < len(lines)
 
 
 def answer(browser, *, accept):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import tracemalloc
 import zipfile
 from base64 import b64decode
 
@@ -90,6 +91,16 @@ def line(*points):
 )
 def test_the_next_step_of_a_drawing(strokes, step):
     assert find_next_step(document(strokes=strokes)) == step
+
+
+def test_the_next_step_of_many_lines_of_one_family_compares_few_of_them():
+    lines = [line(15, 30 + k / 50, 60, 31 + k / 50, 105, 30 + k / 50) for k in range(2000)]
+    many = document(strokes=[OUTLINE, *lines])
+    tracemalloc.start()
+    assert find_next_step(many) == "across"
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 150e6  # bytes; all pairs of points would take 2 GB
 
 
 def test_strokes_beyond_the_page_enlarge_it():
