@@ -78,8 +78,21 @@ def random_hull(seed, points=6, stretch=(1, 1, 1)):
     return cf.Mesh(at, faces.astype(np.int32))
 
 
-def least_of_charges(mesh):
-    """The least energy of all charges of a surface of genus 0, from angles of corners and vertices alone."""
+def torus_of_seven(genus=1):
+    """Moebius' torus with seven vertices, which may lie anywhere; or two, joined at a face of each."""
+    faces = [[i, (i + one) % 7, (i + other) % 7] for i in range(7) for one, other in ((1, 3), (3, 2))]
+    if genus == 2:
+        number = np.array([1, 0, 7, 3, 8, 9, 10])
+        faces = np.append(faces[1:], number[faces[1:]], axis=0)
+    at = np.random.default_rng(genus).normal(size=(np.max(faces) + 1, 3))
+    return cf.Mesh(at, np.array(faces, np.int32))
+
+
+def form_of_charges(mesh):
+    """The energy of charges as a quadratic form, the turns of vertices, and the sum of charges.
+
+    From angles of corners and vertices alone.
+    """
     faces, count = mesh.faces, len(mesh.vertices)
     laplacian, defect = np.zeros((count, count)), np.full(count, 2 * np.pi)
     for a, b, c in [np.roll(face, k) for face in faces for k in range(3)]:
@@ -88,11 +101,15 @@ def least_of_charges(mesh):
         defect[a] -= np.arccos(np.clip(cosine, -1, 1))
         laplacian[a, b] -= 1
         laplacian[a, a] += 1
-    turns = 2 * defect / np.pi
-    numbers = [np.arange(np.ceil(turn - 1.5), turn + 1.5) for turn in turns]
-    charges = np.array([*itertools.product(*numbers)])
-    charges = (charges - turns)[charges.sum(axis=1) == 8]
-    return np.pi**2 / 2 * np.einsum("kv,vw,kw->k", charges, np.linalg.pinv(laplacian), charges).min()
+    return np.pi**2 / 2 * np.linalg.pinv(laplacian), 2 * defect / np.pi, 4 * count - 2 * len(faces)
+
+
+def least_of_charges(mesh):
+    """The least energy of all charges near those of smooth fields."""
+    form, turns, total = form_of_charges(mesh)
+    charges = np.array([*itertools.product(*(np.arange(np.ceil(turn - 1.5), turn + 1.5) for turn in turns))])
+    charges = (charges - turns)[charges.sum(axis=1) == total]
+    return np.einsum("kv,vw,kw->k", charges, form, charges, optimize=True).min()
 
 
 def try_all_integers(instance, span=2):
