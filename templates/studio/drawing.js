@@ -1,6 +1,6 @@
 // The left picture: strokes, mask and field, in the units of the drawing.
 
-import { boxOf } from "./strokes.js";
+import { boxOf, withReflection } from "./strokes.js";
 
 const dark = matchMedia("(prefers-color-scheme: dark)");
 const PALETTE = JSON.parse(document.body.dataset.palette); // of all pictures: u, v, stroke, plus and minus
@@ -58,7 +58,11 @@ export class View {
   }
   /** Left, top, right and bottom of the part of the drawing that is seen. */
   get seen() { return [-this.x / this.scale, -this.y / this.scale, (this.wide - this.x) / this.scale, (this.high - this.y) / this.scale]; }
-  drawCursor(context) {
+  /** Draws the cursor of the keyboard, and a ring round a place that a message names. */
+  drawPlaces(context, spot) {
+    if (spot) for (const [colour, width] of [["#fffc", 7], [colours().cursor, 3]]) {
+      context.strokeStyle = colour; context.lineWidth = width / this.scale; context.beginPath(); context.arc(...spot, 14 / this.scale, 0, 7); context.stroke();
+    }
     if (!this.cursor || document.activeElement !== this.canvas) return;
     const [x, y] = this.cursor, arm = 9 / this.scale;
     context.strokeStyle = colours().cursor; context.lineWidth = 2 / this.scale; context.beginPath();
@@ -177,6 +181,11 @@ export function paintBase(view, { doc, picture, opacity, chosen, field, lines, m
   context.fillStyle = ink.beyond; context.fillRect(left, top, right - left, bottom - top); context.clearRect(...doc.page);
   if (picture && opacity) { context.globalAlpha = opacity; context.drawImage(picture, ...doc.page); context.globalAlpha = 1; }
   context.strokeStyle = ink.page; context.lineWidth = thin; context.strokeRect(...doc.page);
+  if (doc.axis) {
+    const [ax, ay, bx, by] = doc.axis, far = (right - left + bottom - top + Math.abs(ax - left) + Math.abs(ay - top)) / Math.hypot(bx - ax, by - ay);
+    context.strokeStyle = ink.cursor; context.setLineDash([10 * thin, 4 * thin, 2 * thin, 4 * thin]);
+    context.beginPath(); trace(context, [-far, far].flatMap(t => [ax + t * (bx - ax), ay + t * (by - ay)])); context.stroke(); context.setLineDash([]);
+  }
   if (field) {
     const { x, y, pixel, rows, columns } = field.frame, place = [x, y, pixel * columns, pixel * rows];
     context.imageSmoothingEnabled = false;
@@ -197,7 +206,7 @@ export function paintBase(view, { doc, picture, opacity, chosen, field, lines, m
 const WIDTHS = { ignored: 1.4, cut: 2.6, line: 2.6 };
 
 /** Copies the hidden canvases and draws what follows the pointer. live: the tool in use, with what it has done so far. */
-export function paint(view, { live, brush, doc, chosen, field, mode }) {
+export function paint(view, { live, brush, doc, chosen, field, mode, spot }) {
   const isStill = (_, k) => !live?.shift || !chosen.has(k), ink = colours(), thin = 1 / view.scale;
   const context = view.begin(view.canvas, view.base, inkOf(view, doc.strokes.filter(isStill), WIDTHS));
   for (const stroke of doc.strokes.filter((_, k) => !isStill(_, k))) drawInk(context, [stroke], ink[stroke.mark], WIDTHS[stroke.mark] * thin);
@@ -206,9 +215,9 @@ export function paint(view, { live, brush, doc, chosen, field, mode }) {
     context.beginPath(); context.arc(x, y, 5 * thin, 0, 7); context.fill();
   }
   if (live?.tool === "draw") {
-    const points = live.path.length > 2 ? live.path : [...live.path, ...live.path];
+    const path = live.path.length > 2 ? live.path : [...live.path, ...live.path];
     context.save(); context.beginPath(); context.rect(...doc.page); context.clip();
-    drawInk(context, [{ points, pressures: live.pressures }], ink[live.mark], 2.6 / view.scale); context.restore();
+    drawInk(context, withReflection(path, doc.axis, live.reach).map(points => ({ points, pressures: live.pressures })), ink[live.mark], 2.6 * thin); context.restore();
   } else if (live?.path) {
     const wide = { erase: 2 * live.radius, paint: 2 * live.radius, unpaint: 2 * live.radius }[live.tool];
     context.lineWidth = wide ?? 1.5 / view.scale;
@@ -219,5 +228,5 @@ export function paint(view, { live, brush, doc, chosen, field, mode }) {
     context.strokeStyle = ink.cursor; context.lineWidth = 1 / view.scale;
     context.beginPath(); context.arc(brush.x, brush.y, brush.radius, 0, 7); context.stroke();
   }
-  view.drawCursor(context);
+  view.drawPlaces(context, spot);
 }

@@ -58,7 +58,7 @@ const doubtMap = surface => surface.doubtful ??= gridPicture(surface.rows, surfa
   return n < 0 || surface.confidence[n] >= DOUBT ? [0, 0, 0, 0] : [235, 120, 0, 130 - surface.confidence[n]];
 });
 
-export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strokes, hints, live }) {
+export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strokes, hints, live, spot }) {
   const context = view.begin(view.canvas);
   if (!frame) return;
   const wide = frame.pixel * frame.columns, high = frame.pixel * frame.rows;
@@ -89,7 +89,7 @@ export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strok
       context.stroke(); context.beginPath(); context.arc(hint.x, hint.y, (width + 1) * thin, 0, 7); context.fill();
     }
   }
-  view.drawCursor(context);
+  view.drawPlaces(context, spot);
 }
 
 export const reachOf = frame => 0.3 * frame.pixel * Math.max(frame.rows, frame.columns);

@@ -96,6 +96,24 @@ export function fitShift(strokes, [x, y, wide, high], shift) {
   });
 }
 
+/** Points x, y, x, y, ... on the other side of an axis x, y, x, y. */
+export function reflected(points, [ax, ay, bx, by]) {
+  const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy;
+  return points.map((value, k) => {
+    const even = k - k % 2, away = 2 * ((points[even] - ax) * dy - (points[even + 1] - ay) * dx) / long;
+    return rounded(k % 2 ? value + away * dx : value - away * dy);
+  });
+}
+
+/** A path with its reflection. Ends within a reach of the axis are moved onto it; a path along the axis has none. */
+export function withReflection(path, axis, reach) {
+  if (!axis) return [path];
+  const there = reflected(path, axis), isNear = (_, k) => Math.hypot(path[k] - there[k], path[k ^ 1] - there[k ^ 1]) < 2 * reach;
+  const isAlong = path.every(isNear), isEnd = k => k < 2 || k >= path.length - 2;
+  const pulled = path.map((value, k) => isNear(value, k) && (isAlong || isEnd(k)) ? rounded((value + there[k]) / 2) : value);
+  return isAlong ? [pulled] : [pulled, reflected(pulled, axis)];
+}
+
 // Samples x, y, pressure of a stroke; without pressures the third is its weight.
 const samplesOf = ({ points, pressures, weight }) => Array.from({ length: points.length / 2 }, (_, k) => [points[2 * k], points[2 * k + 1], pressures?.[k] ?? weight]);
 const between = (from, to, t) => from.map((value, k) => rounded(value + t * (to[k] - value)));

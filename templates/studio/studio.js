@@ -5,7 +5,7 @@ import { View, paint, paintBase } from "./drawing.js";
 import { listen, watchPen } from "./pointer.js";
 import { Server, lined, sentence, trouble } from "./server.js";
 import { LAMP_AT, leaning, mirrored, paintSurface, reachOf, tipOf } from "./shading.js";
-import { clipped, erased, fitShift, isClosed, moved, rounded, strokeAt, strokesIn } from "./strokes.js";
+import { clipped, erased, fitShift, isClosed, moved, reflected, rounded, strokeAt, strokesIn, withReflection } from "./strokes.js";
 
 const $ = selector => document.querySelector(selector), all = selector => [...document.querySelectorAll(selector)];
 const page = crypto.randomUUID(), KEPT = "crossfield-studio", PARTS = ["file", "picture", "source"];
@@ -14,6 +14,7 @@ const state = {
   history: new History(emptyDocument()), doc: null, chosen: new Set(), tool: "draw", mark: "cut", preset: true, next: "outline", live: null, brush: null, edit: 0,
   field: null, lines: null, surface: null, mode: "crosses", kind: "shaded", lamp: LAMP_AT, suspects: new Set(),
   copied: [], fingers: null, // whether fingers draw; null: until a pen comes
+  spot: null, // a place that a message names
 };
 state.doc = state.history.now;
 const left = new View($("#drawing"), () => refresh()), right = new View($("#surface"), () => refresh());
@@ -37,7 +38,18 @@ function refresh(base = true) {
 // Messages.
 let bannerKind = "";
 function banner(text, { kind = "error", retry = false } = {}) {
-  bannerKind = text ? kind : ""; $("#banner").hidden = !text; $("#banner span").textContent = text; $("#retry").hidden = !retry;
+  bannerKind = text ? kind : ""; $("#banner").hidden = !text; $("#banner span").replaceChildren(...placed(text)); $("#retry").hidden = !retry;
+}
+/** A text as nodes: coordinates are buttons that mark their place on both pictures. */
+function placed(text) {
+  const number = "-?[\\d.]+(?:e[+-]?\\d+)?", show = spot => () => { state.spot = spot; refresh(false); };
+  return text.split(new RegExp(`(\\(${number}, ${number}\\))`)).map((part, k) => {
+    if (k % 2 === 0) return part;
+    const made = action(part, event => event.target.focus()), spot = part.match(new RegExp(number, "g")).map(Number);
+    made.className = "place"; made.title = "Show this place"; made.ariaLabel = `Show the place ${part}`;
+    for (const [kind, shown] of Object.entries({ pointerenter: spot, focus: spot, pointerleave: null, blur: null })) made.addEventListener(kind, show(shown));
+    return made;
+  });
 }
 const clear = kind => { if (bannerKind === kind) banner(""); };
 const status = text => { $("#status").textContent = text; };
@@ -107,6 +119,7 @@ function keep() {
   if (!store(KEPT, now, doc => textWithout(doc, PARTS))) banner("This drawing is too large to survive a reload of this page. Save it as a file.", { kind: "large" });
   else if (!whole) banner("A reload of this page keeps the strokes, but not the picture or file that they come from, which is too large. Save the drawing.", { kind: "large" });
 }
+addEventListener("pagehide", () => { for (let most = 256; most && !store(`${KEPT}-past`, state.history.pack(most, PARTS)); most >>= 1); });
 function kept() {
   try {
     const text = sessionStorage.getItem(KEPT), parts = PARTS.map(part => [part, JSON.parse(sessionStorage.getItem(`${KEPT}-${part}`))]);
@@ -158,7 +171,9 @@ function take(found) {
     clear("error");
     state.field = { ...found, kinds: decoded.bytes(found.kinds), u: decoded.floats(found.u), v: decoded.floats(found.v), number: numbered(decoded.bytes(found.mask)) };
     state.lines = null; if (state.first) { state.first = false; times.field = seconds(); times.fine = times.lines = times.surface = ""; } else times.fine = seconds();
-    if (!right.zoomed) { const { x, y, pixel, rows, columns } = found.frame; right.fit([x, y, x + pixel * columns, y + pixel * rows]); }
+    const { x, y, pixel, rows, columns } = found.frame;
+    right.box = [x, y, x + pixel * columns, y + pixel * rows];
+    if (!right.zoomed) zoom(right, 0);
     numbers(found); proceed(found.next);
   } else if (found.stage === "lines") { state.lines = found.families; times.lines = seconds(); }
   else if (found.stage === "surface") {
@@ -198,7 +213,7 @@ const element = (tag, text, ...children) => { const made = document.createElemen
 const action = (text, run) => { const made = element("button", text); made.addEventListener("click", run); return made; };
 function doubts() {
   const items = [], item = (text, ...actions) => {
-    const row = element("div", ""); row.className = "row"; row.append(...actions); items.push(element("li", text, row));
+    const row = element("div", ""); row.className = "row"; row.append(...actions); items.push(element("li", "", ...placed(text), row));
   };
   const { field, surface } = state;
   for (const text of field?.warnings ?? []) item(`Mask: ${text}.`, action("Areas", () => choose("area")), action("Paint the mask", () => choose("paint")));
@@ -260,6 +275,10 @@ function next(name) {
   options[(at + 1) % options.length].click();
 }
 
+/** Zooms a picture by a factor; 0 fits it. */
+function zoom(view, factor) { factor ? view.zoom(factor) : view.fit(view.box); refresh(); }
+const zoomFocused = factor => { zoom(document.activeElement === right.canvas ? right : left, factor); };
+
 // Tools: begin, move and end at points of the drawing, by pointer or by keyboard.
 const brushRadius = () => $("#brush").value * (state.field?.frame.pixel ?? state.doc.page[2] / 60) / 2;
 const tools = {
@@ -269,9 +288,11 @@ const tools = {
     state.live = { tool, mark: state.mark, path: [rounded(x), rounded(y)], reach, radius: tool === "erase" ? REACH / left.scale : brushRadius(), pressures: [rounded(pressure)] };
     refresh(false);
   },
-  move([x, y], { pressure = 1 } = {}) {
+  move([x, y], { pressure = 1, straight = false } = {}) {
     const { live } = state;
     if (!live) return;
+    live.bend = straight && live.tool === "draw" ? live.bend ?? live.path.length : null; // whence a straight part runs
+    if (live.bend) { live.path.length = live.bend; live.pressures.length = live.bend / 2; }
     const [px, py] = live.path.slice(-2);
     if (Math.hypot(x - px, y - py) * left.scale < 1.2) return;
     live.path.push(rounded(x), rounded(y)); live.pressures.push(rounded(pressure));
@@ -286,7 +307,11 @@ const tools = {
     refresh(false);
   },
   cancel() { const { live } = state; state.live = null; refresh(Boolean(live?.shift)); },
-  tap(point, contact) { if (["select", "area"].includes(state.tool)) { tools.begin(point, contact); tools.end(); } },
+  tap(point, contact) { if (["select", "area", "mirror"].includes(state.tool)) { tools.begin(point, contact); tools.end(); } },
+  refuse() {
+    if (state.fingers !== false || state.refused || bannerKind) return;
+    state.refused = true; banner("Since the pen was used, a finger scrolls the page and draws nothing. Press “Finger draws” to draw with it.", { kind: "fingers" });
+  },
   nudge(step) {
     if (state.tool !== "select" || !state.chosen.size) return false;
     if (state.live?.path) return true; // a pointer is at work
@@ -303,10 +328,10 @@ function shifted({ shift }) {
   return by.some(Boolean) ? { ...now, strokes: now.strokes.map((stroke, k) => state.chosen.has(k) ? moved(stroke, by) : stroke) } : now;
 }
 function finish(live) {
-  const { tool, path, reach, radius, mark: kind, pressures } = live, first = path?.slice(0, 2);
+  const { tool, path, reach, radius, mark: kind, pressures } = live, first = path?.slice(0, 2), { axis } = state.doc;
   if (tool === "draw" && path.length > 2) {
     const weight = rounded(pressures.reduce((sum, each) => sum + each, 0) / pressures.length), varied = pressures.some(each => each !== pressures[0]);
-    const parts = clipped({ points: path, mark: kind, weight, ...varied && { pressures } }, state.doc.page);
+    const parts = withReflection(path, axis, reach).flatMap(points => clipped({ points, mark: kind, weight, ...varied && { pressures } }, state.doc.page));
     if (kind === "cut" && isClosed(path)) presetLine();
     if (parts.length) { state.chosen.clear(); commit(doc => ({ ...doc, strokes: [...doc.strokes, ...parts] })); } else status("Draw inside the page.");
   } else if (live.shift) {
@@ -317,13 +342,17 @@ function finish(live) {
     if (hasLeft(live)) select(strokesIn(state.doc.strokes, path));
     else select(hit < 0 ? [] : [hit]);
   } else if (tool === "erase") {
-    const strokes = erased(state.doc.strokes, path, radius);
+    const strokes = [path, ...axis ? [reflected(path, axis)] : []].reduce((rest, each) => erased(rest, each, radius), state.doc.strokes);
     state.chosen.clear(); if (strokes.length !== state.doc.strokes.length || strokes.some((stroke, k) => stroke !== state.doc.strokes[k])) commit({ strokes });
-  } else if (tool === "paint" || tool === "unpaint") editMask({ kind: tool === "paint" ? "paint" : "erase", points: path, radius: rounded(radius) });
+  } else if (tool === "paint" || tool === "unpaint") editMask(...[path, ...axis ? [reflected(path, axis)] : []].map(points => ({ kind: tool === "paint" ? "paint" : "erase", points, radius: rounded(radius) })));
   else if (tool === "area") editMask({ kind: "toggle", points: first, radius: 0 });
   else if (tool === "turn") turn({ path }, true);
+  else if (tool === "mirror") {
+    const [x, y] = first, isHit = axis && withReflection(first, axis, reach).length === 1;
+    commit({ axis: hasLeft(live) ? [x, y, ...path.slice(-2)] : isHit ? undefined : [x, y, x, rounded(y + 1)] }); choose("draw");
+  }
 }
-const editMask = edit => commit(doc => ({ ...doc, mask: [...doc.mask, edit] }));
+const editMask = (...edits) => commit(doc => ({ ...doc, mask: [...doc.mask, ...edits] }));
 
 // Turning a drawing in space: the file is read again from another side.
 let turning = null;
@@ -359,7 +388,7 @@ const arrows = {
     refresh();
   },
   cancel() { state.arrow = null; refresh(false); },
-  nudge: () => false,
+  nudge: () => false, refuse() {},
   tap(point) {
     if (state.arrow) { arrows.move(point); arrows.end(); return; }
     arrows.begin(point);
@@ -429,7 +458,7 @@ const actions = {
   undo: () => step(-1), redo: () => step(1), save, flip, copy, paste, delete: remove, retry: request, dismiss: () => banner(""),
   open: () => $("#file").click(), unhint: () => commit({ hints: [] }),
   empty: () => { if (mayReplace()) replace({ ...emptyDocument(), page: canvasPage(), size: state.doc.size }); },
-  fingers: () => { state.fingers = !fingersDraw(); controls(); },
+  fingers: () => { state.fingers = !fingersDraw(); clear("fingers"); controls(); },
   help: () => dialog("Help", $("#help").content.cloneNode(true)),
 };
 const closeMenus = () => all(".menu[open]").forEach(each => { each.open = false; });
@@ -437,10 +466,11 @@ document.addEventListener("click", event => {
   const button = event.target.closest("button");
   if (!event.target.closest(".menu") || button) closeMenus();
   if (!button) return;
-  const { do: name, tool, mark: kind, download: what, sample } = button.dataset;
+  const { do: name, tool, mark: kind, download: what, sample, zoom: factor } = button.dataset;
   if (name) actions[name]();
   if (tool) choose(tool);
   if (kind) mark(kind);
+  if (factor) zoom(button.closest("#right") ? right : left, Number(factor));
   if (what) download(what);
   if (sample && mayReplace()) read(`sample/${sample}`, sample).then(found => enter(found));
 });
@@ -465,13 +495,14 @@ all("input[name=surface]").forEach(each => each.addEventListener("change", () =>
 // Keys.
 const hasText = () => getSelection().type === "Range"; // which the browser copies
 const keys = {
-  d: () => choose("draw"), v: () => choose("select"), e: () => choose("erase"), b: () => choose("paint"), n: () => choose("unpaint"), a: () => choose("area"), r: () => choose("turn"),
+  d: () => choose("draw"), v: () => choose("select"), e: () => choose("erase"), b: () => choose("paint"), n: () => choose("unpaint"), a: () => choose("area"), r: () => choose("turn"), m: () => choose("mirror"),
   1: () => mark("line"), 2: () => mark("cut"), 3: () => mark("ignored"), f: flip, q: () => next("field"), w: () => next("surface"),
   delete: remove, backspace: remove, escape: () => { closeMenus(); tools.cancel(); arrows.cancel(); select([]); }, "?": actions.help,
-  "+": () => { left.zoom(1.25); refresh(); }, "-": () => { left.zoom(0.8); refresh(); }, 0: () => { left.fit(pageBox(state.doc)); right.zoomed = false; right.resize(); refresh(); },
+  "+": () => zoomFocused(1.25), "=": () => zoomFocused(1.25), "-": () => zoomFocused(0.8), 0: () => zoomFocused(0),
   "ctrl+z": () => step(-1), "ctrl+shift+z": () => step(1), "ctrl+y": () => step(1), "ctrl+s": save, "ctrl+o": actions.open, "ctrl+c": () => !hasText() && copy(), "ctrl+x": () => !hasText() && (copy() ?? remove()), "ctrl+v": paste,
   "ctrl+a": () => select(state.doc.strokes.map((_, k) => k)),
 };
+for (const key of ["+", "=", "-", "0"]) keys[`ctrl+${key}`] = keys[`ctrl+shift+${key}`] = () => document.activeElement.localName === "canvas" && keys[key](); // else the browser zooms the page
 document.addEventListener("keydown", event => {
   const typing = event.target.closest("input:not([type=range],[type=radio],[type=checkbox]), select, dialog");
   const control = event.ctrlKey || event.metaKey, key = event.key.toLowerCase();
@@ -493,7 +524,9 @@ addEventListener("beforeunload", event => { if (!isSaved()) event.preventDefault
 async function begin() {
   const mine = kept(), same = sessionStorage.getItem(`${KEPT}-at`) === location.pathname, saved = sessionStorage.getItem(`${KEPT}-saved`);
   const given = await read("first", "First drawing"), first = documentOf(given ?? { document: { page: canvasPage() } });
-  state.history.reset(mine || first, { saved: !mine || saved === "yes" }); show(state.history.now);
+  state.history.reset(mine || first, { saved: !mine || saved === "yes" });
+  if (mine) try { state.history.unpack(sessionStorage.getItem(`${KEPT}-past`), PARTS); } catch { /* without its past */ }
+  show(state.history.now);
   if (mine && given && !same && !confirm("This tab has a drawing from an earlier page. Keep it instead of the new one? If not, undo brings it back.")) replace(first);
   else if (mine) keep();
   else if (given) showNotes(given);

@@ -33,7 +33,7 @@ def document(browser):
     return json.loads(browser.execute_script("return sessionStorage.getItem('crossfield-studio')"))
 
 
-def drag(browser, points, canvas="#drawing"):
+def drag(browser, points, canvas="#drawing", *, shift=False):
     """Press the mouse at the first of these points of a canvas, move along the others, and let go."""
     x, y = browser.execute_script(BOX, canvas)
 
@@ -41,7 +41,14 @@ def drag(browser, points, canvas="#drawing"):
         place = {"x": x + point[0], "y": y + point[1]}
         browser.execute_cdp_cmd(
             "Input.dispatchMouseEvent",
-            {"type": kind, **place, "button": "left", "buttons": buttons, "clickCount": 1},
+            {
+                "type": kind,
+                **place,
+                "button": "left",
+                "buttons": buttons,
+                "clickCount": 1,
+                "modifiers": 8 * shift,
+            },
         )
 
     send("mousePressed", points[0], 1)

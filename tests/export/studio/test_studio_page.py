@@ -235,8 +235,14 @@ def answer(browser, *, accept):
 def test_no_drawing_is_lost_by_a_reload_and_another_file(empty, tmp_path):
     browser = empty
     drag(browser, [(100, 200), (200, 220), (300, 200)])
+    drag(browser, [(100, 300), (200, 320), (300, 300)])
     drawn = document(browser)
     browser.refresh()
+    assert document(settled(browser)) == drawn
+    find(browser, "#undo").click()
+    assert document(settled(browser))["strokes"] == drawn["strokes"][:1]
+    browser.refresh()
+    find(settled(browser), "#redo").click()
     assert document(settled(browser)) == drawn
     other = tmp_path / "other.studio.json"
     other.write_text(json.dumps(PEBBLE))
@@ -312,6 +318,66 @@ def test_every_control_has_a_name(empty):
         ".map(each => each.outerHTML)"
     )
     assert nameless == []
+    mute = "return [...document.querySelectorAll('main button, header button:not(.menu *)')].filter("
+    mute += "each => !each.title && !each.querySelector('kbd')).map(each => each.outerHTML)"
+    assert empty.execute_script(mute) == []
+
+
+def test_shift_draws_straight_and_an_axis_mirrors_strokes(empty):
+    press(empty, "m")
+    drag(empty, [(240, 300), (240, 300)])
+    drag(empty, [(100, 200), (150, 260), (238, 210)], shift=True)
+    middle = document(empty)["axis"][0]
+    (left, top, end, low), (right, *others) = [each["points"] for each in document(empty)["strokes"]]
+    assert left < middle < right
+    assert (right + left, end, others) == (pytest.approx(2 * middle), middle, [top, end, low])
+    tool(empty, "erase")
+    drag(empty, [(170, 180), (170, 230)])
+    assert len(document(empty)["strokes"]) == 4
+    press(empty, "m")
+    drag(empty, [(240, 400), (240, 400)])
+    assert "axis" not in document(empty)
+
+
+def test_the_view_is_moved_by_the_space_bar_and_zoomed_by_buttons_and_keys(empty):
+    def line():
+        tool(empty, "draw")
+        return document(drag(empty, [(100, 200), (200, 200)]))["strokes"][-1]["points"]
+
+    def space(kind):
+        empty.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, "key": " ", "code": "Space"})
+
+    first = line()
+    space("keyDown")
+    drag(empty, [(100, 200), (150, 230)])
+    space("keyUp")
+    assert len(document(empty)["strokes"]) == 1
+    moved = line()
+    assert [b - a for a, b in zip(first, moved, strict=True)] == pytest.approx(
+        [(first[0] - first[2]) / 2, (first[0] - first[2]) * 0.3] * 2, abs=0.01
+    )
+    find(empty, "#left [aria-label='Zoom in']").click()
+    assert line()[2] - line()[0] == pytest.approx((first[2] - first[0]) / 1.25, abs=0.01)
+    find(empty, "#left [data-zoom='0']").click()
+    assert line() == first
+    press(empty, "-", control=True)
+    assert line()[2] - line()[0] == pytest.approx((first[2] - first[0]) / 0.8, abs=0.01)
+
+
+def test_coordinates_of_a_message_mark_their_place(empty, tmp_path):
+    hatch = "".join(f'<path d="M{20 + 2 * k} 30l9 20"/>' for k in range(12))
+    flow = '<path stroke="red" d="M10 50Q50 30 90 50"/><circle cx="50" cy="50" r="45"/>'
+    load(empty, tmp_path / "a.svg", f'<svg fill="none" stroke="black">{hatch}{flow}</svg>'.encode())
+    pictures = "return [...document.querySelectorAll('canvas')].map(each => each.toDataURL())"
+    wait = "requestAnimationFrame(() => requestAnimationFrame(arguments[0]))"
+    seen = []
+    for selector in ("#name", "#banner .place", "#name"):
+        find(empty, selector).click()
+        empty.execute_async_script(wait)
+        seen.append(empty.execute_script(pictures))
+    assert "round (35.5, 40)" in banner(empty)
+    assert seen[0] == seen[2]
+    assert all(a != b for a, b in zip(*seen[:2], strict=True))
 
 
 @pytest.mark.parametrize("width, scheme", [(1280, "light"), (390, "dark")])

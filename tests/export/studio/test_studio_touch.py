@@ -7,7 +7,7 @@ import time
 import pytest
 from browsing import find, show
 from crossfield.export.pictures.palette import LIGHT
-from studio_pages import BOX, document, drag, pebble, press, settled, tool, until
+from studio_pages import BOX, banner, document, drag, pebble, press, settled, tool, until
 from studios import PEBBLE
 
 pytestmark = pytest.mark.slow
@@ -122,6 +122,7 @@ def test_after_the_pen_one_finger_draws_only_on_demand_and_two_zoom(tablet):
     hand.rest()
     hand.swipe((60, 250), (200, 280))
     assert len(spots(tablet)) == 2
+    assert "Press “Finger draws”" in banner(tablet)
 
     hand.touch("touchStart", (100, 100))
     hand.touch("touchStart", (100, 100), (200, 200))
