@@ -8,6 +8,7 @@ PAGE = Path(__file__).resolve().parents[1] / "performance.md"
 BENCHMARKS = {
     "closed": "proofs on closed surfaces, for docs/notebooks/mesh.md",
     "start": "CPU seconds of short commands",
+    "studio": "the answer of the studio to a stroke",
     "writing": "the writers next to those of other programs",
 }
 
