@@ -6,6 +6,7 @@ fields of 24 and of 96 pixels look alike. Streamlines are smooth curves, with fe
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -56,13 +57,25 @@ def field_sheet(field: CrossField, drawing: Underlay | None = None) -> Sheet:
 def strokes_sheet(
     instance: Instance, page: Box, drawing: Underlay | None = None, width: float | None = None
 ) -> Sheet:
-    """The strokes of the drawing, or of the instance, on a page. width: of lines in pixels of the grid."""
+    """The strokes of the drawing, or of the instance, on a page that is moved to the origin.
+
+    Renderers compute in single precision, too coarse for a page far away. width: of lines in pixels of the
+    grid.
+    """
     frame, unit = _frame_and_unit(instance)
     if drawing is None:
         layer = Layer("strokes", _stroke_lines(frame, unit))
     else:
         layer = _drawing_layer(drawing, unit, width and width * instance.pixel_size)
-    return Sheet(page, (layer,))
+    x, y, wide, high = page
+    parts = tuple(
+        replace(mark, lines=[piece - (x, y) for piece in mark.lines])
+        if isinstance(mark, Lines)
+        else ImageMark((mark.box[0] - x, mark.box[1] - y, *mark.box[2:]), mark.colours)
+        for mark in layer.parts
+        if isinstance(mark, Lines | ImageMark)
+    )
+    return Sheet((0.0, 0.0, wide, high), (replace(layer, parts=parts),))
 
 
 def page_of(instance: Instance) -> Box:

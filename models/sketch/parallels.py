@@ -101,11 +101,14 @@ def _find_chords(curves: Curves) -> tuple[Indices, Indices, Floats, Floats, Bool
 
 def describe_lines_across(curves: Curves, region: Bools, frame: Frame) -> str | None:
     """Straight lines that leave a region [height, width] on both sides, unless others are curvature lines."""
+    from scipy import ndimage
+
     first, _, start, way, is_straight = _find_chords(curves)
     share = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     at = (start[:, None] + share[:, None] * way[:, None] - (frame.x, frame.y)) / frame.pixel
     column, row = np.moveaxis(np.floor(at).astype(int).clip(-1, max(frame.shape)), -1, 0)
-    around = np.pad(drop_narrow_parts(region, 3), (1, max(frame.shape)))
+    body = ndimage.binary_dilation(drop_narrow_parts(region, 3), np.ones((3, 3)))
+    around = np.pad(body, (1, max(frame.shape)))
     is_inside = around[row + 1, column + 1]
     is_across = is_straight & ~is_inside[:, [*range(_BEYOND), *range(-_BEYOND, 0)]].any(axis=1)
     is_across &= (is_inside.mean(axis=1) > 1 / 3) & ~(curves.line & ~curves.line.all())[first]

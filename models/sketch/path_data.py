@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError, shortened
 from ..input_limits import MAX_CURVES, MAX_LENGTH
 from ..instance.domain import Floats
-from .curves import lines_as_cubics
+from .curves import lines_as_cubics, run_numbers
 
 PPI: Final = 96.0  # CSS pixels per inch
 EM: Final = 16.0  # CSS pixels per letter, unless the drawing chooses another font
@@ -55,6 +55,15 @@ def shape_curves(
         straight = (values[:, 0] == values[:, 1]) & (values[:, 2] == values[:, 3])
         points[straight] = lines_as_cubics(points[straight, 0], points[straight, 3])
     return points, fault
+
+
+def path_data(points: Floats) -> str:
+    """Path data of cubics (k, 4, 2)."""
+    starts = np.flatnonzero(np.diff(run_numbers(points, np.zeros(len(points), dtype=np.int32)), prepend=-1))
+    text = [f"C{' '.join(f'{value:.9g}' for value in cubic[1:].ravel())}" for cubic in points]
+    for start in starts.tolist():
+        text[start] = f"M{points[start, 0, 0]:.9g} {points[start, 0, 1]:.9g}{text[start]}"
+    return "".join(text)
 
 
 def length_in_pixels(text: str) -> float | None:

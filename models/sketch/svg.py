@@ -54,6 +54,7 @@ from .svg_page import (
     GREATEST,
     UNPAGED,
     DrawingPage,
+    bring_near,
     fit_view,
     frame_drawing,
     page_of,
@@ -61,7 +62,7 @@ from .svg_page import (
     window_around,
 )
 from .thinning import smooth_way, trace_shape
-from .visible import PaintedShape, Seen, opaque_colour, picture_of, see_strokes
+from .visible import PaintedShape, Seen, choose_paper, opaque_colour, picture_of, see_strokes
 
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
 _INHERITED: Final = (
@@ -82,6 +83,8 @@ _SIDES: Final = {"left": "0%", "top": "0%", "center": "50%", "right": "100%", "b
 _WIDEST: Final = 0.05  # greatest width of a filled stroke as a share of the drawing: others are areas
 _LONG: Final = 10.0  # least half perimeter of a filled stroke in its widths
 _PAINTED: Final = 0.1  # least length of traced strokes, as a share of the length of others
+_FAR: Final = 1000.0  # sides of the page: coordinates beyond it are too large for a renderer
+_FINEST: Final = 1e-5  # of the page: least width of a stroke that is seen
 _FAINT: Final = 0.24  # of the strength of others: less than half as dark, or a quarter as wide
 _STRONG: Final = 0.1  # of the length of lines: part that is stronger than what others are compared with
 _MOST_STOPS: Final = 100  # stops of a gradient that count
@@ -135,7 +138,10 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
         reason = "; ".join(unread) or "it has no visible path, line or shape; export it again"
         raise NoStrokeError(f"draws no stroke: {reason}")
     window = page.window if page else window_around(painted)
-    framed = frame_drawing(root, page, window, choose_side(root, window, painted))
+    side, framing = choose_side(root, window, painted), (page, window)
+    if max(walk.reach, *map(abs, window[:2])) > _FAR * max(window[2:]):
+        framing = bring_near(root, walk.places, page, window)
+    framed = frame_drawing(root, *framing, side)
     if pens:
         _paint_strokes(painted, _plain_colours(root, walk.styles, painted), pens, page, matcher)
         curves = _trace_strokes(framed, page, window, unread, has_choice=matcher is not None)
@@ -191,7 +197,8 @@ def _paint_strokes(
     matcher: LabelMatcher | None,
 ) -> None:
     """Paint strokes black, or red where they are curvature lines; white where as pale as the ground."""
-    ground, any_line = np.ones(3), False
+    strokes = [shape for shape in shapes if shape.element in pens or shape.is_stroked]
+    ground, any_line = np.array(opaque_colour(choose_paper(strokes))), False
     for shape, colour in zip(shapes, colours, strict=True):
         is_line = bool(is_red(colour))
         if matcher is not None:
@@ -446,7 +453,9 @@ class _ElementWalk:
     """A walk through a drawing.
 
     styles: of every element, without what it inherits. faults: of shapes, with their names. unused: an
-    element and its transform, for each that is not understood.
+    element and its transform, for each that is not understood. finest: least width that is seen. reach: the
+    greatest coordinate in units of the page. places: the matrix to the page of each element, and the points
+    of a shape.
     """
 
     styles: dict[Element, dict[str, str]]
@@ -458,6 +467,9 @@ class _ElementWalk:
     visited: int = 0
     used: int = 0
     curves: int = 0
+    finest: float = 0.0
+    reach: float = 0.0
+    places: dict[Element, tuple[Any, Floats]] = field(default_factory=dict)
 
     def shapes(self, root: Element, page: DrawingPage | None) -> Iterator[PaintedShape]:
         """Every painted shape in drawing order. Replaces each `use` by a group of what it shows."""
@@ -465,9 +477,11 @@ class _ElementWalk:
 
         named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
         view, box = (page.view, page.box) if page else (UNPAGED, UNPAGED)
+        self.finest = _FINEST * max(box[2:]) if page else 0.0
         stack = [_Place(root, _START, Matrix.scale(box[2] / view[2], box[3] / view[3]), view[2:])]
         while stack:
             place = self._apply_style(stack.pop())
+            self.places[place.element] = place.matrix, np.empty((0, 4, 2))
             tag, element = tag_of(place.element), place.element
             self.visited += 1
             if self.visited > MAX_ELEMENTS:
@@ -487,6 +501,7 @@ class _ElementWalk:
                 continue
             elif tag == "svg" and element is not root:
                 place = _inner_view(place)
+                self.places[element] = place.matrix, np.empty((0, 4, 2))
             inner = replace(place, depth=place.depth + 1)
             stack += [replace(inner, element=child) for child in reversed(element)]
 
@@ -544,12 +559,16 @@ class _ElementWalk:
         scale = float(np.sqrt(abs(place.matrix.determinant)))
         width = length_of(style.get("stroke-width", "1"), 1.0, float(np.hypot(*place.size) / np.sqrt(2)))
         fixed = style.get("vector-effect") == "non-scaling-stroke"
+        width *= 1.0 if fixed else scale
+        if stroke and width < self.finest:
+            self.faults.append(f"{name_of(place.element)}: its stroke is too thin to be seen")
+            return
         yield PaintedShape(
             place.element,
             name_of(place.element),
             self._place_shape(place),
             stroke or fill or "",
-            width=width * (1.0 if fixed else scale) if stroke else 0.0,
+            width=width if stroke else 0.0,
             scale=scale,
             is_stroked=bool(stroke),
             is_filled=bool(fill),
@@ -570,6 +589,7 @@ class _ElementWalk:
             if fault:
                 self.faults.append(f"{name_of(place.element)}: {fault}")
         points, m = self.outlines[key], place.matrix
+        self.places[place.element] = m, points
         self.curves += len(points)
         if self.curves > MAX_CURVES:
             raise too_many_curves()
@@ -581,6 +601,8 @@ class _ElementWalk:
                 f"{name_of(place.element)}: a coordinate is not a finite number below {GREATEST:g}"
             )
             return placed[:0]
+        scale = float(np.sqrt(abs(m.determinant)))
+        self.reach = max(self.reach, scale * float(np.abs(points).max(initial=0.0)))
         return np.asarray(placed[(placed != placed[:, :1]).any(axis=(1, 2))])
 
 

@@ -90,7 +90,7 @@ class _LineSamples:
     start: Floats
     end: Floats
     place: Floats
-    pixel: Indices
+    pixels: Indices
     length: Floats
 
 
@@ -106,23 +106,33 @@ def see_strokes(
     styles = [shape.element.get("style", "") for shape in shapes]
     for shape, style in zip(shapes, styles, strict=True):
         shape.element.set("style", style + _widened(shape, pixel))
-    shown = picture_of(root)
-    ground = None
+    paper = choose_paper(shapes)
+    shown, ground = picture_of(root, paper), None
     if any(shape.is_ground for shape in shapes):
         for shape, style in zip(shapes, styles, strict=True):
             bare = style + ";stroke:none" + ("" if shape.is_ground else ";fill:none")
             shape.element.set("style", bare.lstrip(";"))  # resvg drops a style that begins with a semicolon
-        ground = picture_of(root)
-    inside = samples.pixel >= 0
-    colour = np.where(inside[:, None], _at(shown, samples.pixel), np.nan)
-    difference = np.abs(colour - _at(ground, samples.pixel)).max(axis=1)
-    contrast = inside & (difference > PAPER)
+        ground = picture_of(root, paper)
     expected = np.array([opaque_colour(shape.paint) for shape in shapes])[samples.shape]
-    own = contrast & (np.abs(colour - expected).max(axis=1) <= _SAME)
+
+    def look(pixel: Indices) -> tuple[Floats, Floats, Bools, Bools]:
+        """Colours at pixels, how far they are from the ground, where they differ, and where they fit."""
+        colour = np.where(pixel[:, None] >= 0, _at(shown, pixel, paper), np.nan)
+        difference = np.abs(colour - _at(ground, pixel, paper)).max(axis=1)
+        contrast = difference > PAPER
+        return colour, difference, contrast, contrast & (np.abs(colour - expected).max(axis=1) <= _SAME)
+
+    colour, difference, contrast, own = look(samples.pixels[0])
     notes: tuple[str, ...] = ()
     visible, front = own, 2 * samples.shape
     if not own.all():
-        front = _find_fronts(root, shapes, styles, samples, pixel)
+        fronts = _find_fronts(root, shapes, styles, samples, pixel)
+        place = np.zeros(len(own), dtype=np.intp)
+        for side in (1, 2):  # of what is clipped or covered along its centre line
+            place[~contrast & look(samples.pixels[side])[2] & (fronts[side] == 2 * samples.shape)] = side
+        number = np.arange(len(own))
+        front = fronts[place, number]
+        colour, difference, contrast, own = look(samples.pixels[place, number])
         visible = _decide(samples, shapes, front, contrast=contrast, own=own, pixel=pixel)
         # A stroke in the colour of its ground is none, and needs no note.
         notes = _describe_hidden(samples, shapes, ~visible & (front != 2 * samples.shape))
@@ -155,15 +165,31 @@ def opaque_colour(paint: str) -> tuple[float, float, float]:
     return red, green, blue
 
 
-def picture_of(root: Element) -> NDArray[np.uint8]:
-    """The picture of a framed drawing on white, uint8 [h, w, 3], without antialiasing. Raises InputError."""
+def choose_paper(lines: Sequence[PaintedShape]) -> str:
+    """Black if most lines are as light as white paper and no area lies behind them, else white.
+
+    Light lines that are much wider than the others are those of an eraser.
+    """
+    drawn = [line for line in lines if len(line.points)]
+    if not drawn or any(line.is_ground for line in lines):
+        return "#ffffff"
+    light = np.array([1 - min(opaque_colour(line.paint[:7])) < PAPER for line in drawn])
+    length = np.array([np.hypot(*np.diff(line.points, axis=1).T).sum() for line in drawn])
+    width = np.array([line.width for line in drawn])
+    if length @ light <= length.sum() / 2:
+        return "#ffffff"
+    return "#000000" if light.all() or np.median(width[light]) <= 2 * np.median(width[~light]) else "#ffffff"
+
+
+def picture_of(root: Element, paper: str = "#ffffff") -> NDArray[np.uint8]:
+    """The picture of a framed drawing on paper, uint8 [h, w, 3], not antialiased. Raises InputError."""
     import resvg_py
     from PIL import Image
 
     try:
         data = resvg_py.svg_to_bytes(
             svg_string=tostring(root, encoding="unicode"),
-            background="#ffffff",
+            background=paper,
             skip_system_fonts=True,
             shape_rendering="crisp_edges",
         )
@@ -174,10 +200,10 @@ def picture_of(root: Element) -> NDArray[np.uint8]:
     return np.asarray(Image.open(io.BytesIO(bytes(data))).convert("RGB"))
 
 
-def _at(picture: NDArray[np.uint8] | None, pixel: Indices) -> Floats:
-    """Colours (s, 3) in [0, 1] at pixels (s,); white without a picture."""
+def _at(picture: NDArray[np.uint8] | None, pixel: Indices, paper: str) -> Floats:
+    """Colours (s, 3) in [0, 1] at pixels (s,); paper without a picture."""
     if picture is None:
-        return np.ones((len(pixel), 3))
+        return np.tile(opaque_colour(paper), (len(pixel), 1))
     return np.asarray(picture.reshape(-1, 3)[pixel] / 255.0)
 
 
@@ -196,12 +222,16 @@ def _sample_lines(shapes: Sequence[PaintedShape], window: Box, pixel: float) -> 
     ways = np.r_[0.0, ways, 0.0]
     wide, high = (max(1, round(side / pixel)) for side in window[2:])
     place = (at - window[:2]) / np.array(window[2:]) * (wide, high)
-    # A line on the edge of the page shows half of its width.
-    place = np.where(
-        (place >= -0.5) & (place <= (wide + 0.5, high + 0.5)), place.clip(0, (wide - 0.5, high - 0.5)), place
-    )
-    column, row = np.floor(place).astype(np.intp).T
-    inside = (column >= 0) & (column < wide) & (row >= 0) & (row < high)
+    way = evaluate_cubics(points[cubic], end) - evaluate_cubics(points[cubic], start)
+    width = np.maximum([shape.width / pixel for shape in shapes], _LEAST_WIDTH)[number[cubic]]
+    aside = way[:, ::-1] * (-1, 1) * (width / 4 / np.maximum(np.hypot(*way.T), 1e-300))[:, None]
+    pixels = []
+    for spot in (place, place + aside, place - aside):
+        # A line on the edge of the page shows half of its width.
+        near = (spot >= -0.5) & (spot <= (wide + 0.5, high + 0.5))
+        column, row = np.floor(np.where(near, spot.clip(0, (wide - 0.5, high - 0.5)), spot)).astype(np.intp).T
+        inside = (column >= 0) & (column < wide) & (row >= 0) & (row < high)
+        pixels.append(np.where(inside, row * wide + column, -1))
     return _LineSamples(
         number[cubic],
         cubic,
@@ -209,7 +239,7 @@ def _sample_lines(shapes: Sequence[PaintedShape], window: Box, pixel: float) -> 
         start,
         end,
         at,
-        np.where(inside, row * wide + column, -1),
+        np.stack(pixels),
         (ways[:-1] + ways[1:]) / 2,
     )
 
@@ -217,7 +247,7 @@ def _sample_lines(shapes: Sequence[PaintedShape], window: Box, pixel: float) -> 
 def _find_fronts(
     root: Element, shapes: Sequence[PaintedShape], styles: Sequence[str], samples: _LineSamples, pixel: float
 ) -> Indices:
-    """The number of the paint in front (s,) at each sample.
+    """The number of the paint in front (3, s) at the pixels of each sample.
 
     Number 2 n is the line of shape n, and 2 n + 1 the area that it fills. -1 is paper, -2 a mixture.
     """
@@ -230,10 +260,9 @@ def _find_fronts(
     _make_opaque(root)
     picture = picture_of(root).reshape(-1, 3)
     known = {_flat_colour(number): number for number in range(2 * len(shapes))} | {0xFFFFFF: -1}
-    codes, inverse = np.unique(_codes(picture[samples.pixel]), return_inverse=True)
-    front = np.array([known.get(code, -2) for code in codes.tolist()])[inverse]
-    front[samples.pixel < 0] = -1
-    return front
+    codes, inverse = np.unique(_codes(picture[samples.pixels.ravel()]), return_inverse=True)
+    front = np.array([known.get(code, -2) for code in codes.tolist()])[inverse.reshape(samples.pixels.shape)]
+    return np.where(samples.pixels < 0, -1, front)
 
 
 def _codes(colours: NDArray[np.uint8]) -> Indices:
