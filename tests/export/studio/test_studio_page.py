@@ -6,10 +6,13 @@ import base64
 import io
 import json
 import math
+import os
+import signal
 
 import numpy as np
 import pytest
 from browsing import CONTRAST, find, show, sideways
+from children import running
 from crossfield.export.cli.app import invoke
 from crossfield.export.studio.document import Document
 from crossfield.export.studio.session import hints_on_mask, read_drawn
@@ -298,6 +301,11 @@ def test_it_works_with_the_keyboard_alone(empty):
     press(browser, "1", *left, "SPACE", *right, "SPACE")
     press(browser, "2", *left, *["ARROW_UP"] * 10, "SPACE", *["ARROW_DOWN"] * 20, "SPACE")
     assert marks() == ["line", "cut"]
+    (_, before) = [stroke["points"] for stroke in document(browser)["strokes"]]
+    press(browser, "v", "ENTER", "SPACE", *["ARROW_DOWN"] * 3, "SPACE")
+    after = document(settled(browser))["strokes"][1]["points"]
+    assert after[::2] == before[::2]
+    assert after[1] > before[1]
     press(browser, "a", control=True)
     press(browser, "1")
     assert marks() == ["line", "line"]
@@ -426,6 +434,34 @@ def test_a_lost_server_gets_a_message_and_nothing_is_lost(browser, tmp_path):
             opened(browser, another.address)
             assert document(browser) == kept
         assert json.loads(saved.read_text()) == kept
+
+
+def test_a_server_that_hangs_is_reported_and_the_page_recovers(browser, tmp_path):
+    with studio() as page:
+        opened(browser, page.address)
+        pebble(browser, tmp_path)
+        page.process.send_signal(signal.SIGSTOP)
+        find(browser, "#silhouette").click()
+        until(browser, lambda _: "does not answer" in banner(browser))
+        assert find(settled(browser), "#status").text == "No server."
+        assert document(browser)["silhouette"] == "outer"
+        page.process.send_signal(signal.SIGCONT)
+        until(browser, lambda _: not find(browser, "#banner").is_displayed())
+        assert find(settled(browser), "#status").text == ""
+
+
+def test_a_process_that_is_killed_is_reported_with_a_remedy(browser, tmp_path):
+    with studio() as page:
+        opened(browser, page.address)
+        pebble(browser, tmp_path)
+        children = [number for number, (parent, _) in running().items() if parent == page.process.pid]
+        find(browser, "#file").send_keys(str(write(tmp_path / "a.json", PEBBLE | {"size": 256})))
+        until(browser, lambda _: "48 ×" in find(browser, "#numbers").text)
+        for child in children:
+            os.kill(child, signal.SIGKILL)
+        until(browser, lambda _: "choose a smaller size." in banner(browser))
+        pebble(browser, tmp_path)
+        assert not find(browser, "#banner").is_displayed()
 
 
 def test_a_drawing_in_space_is_turned_by_dragging_also_after_a_reload(empty, tmp_path):

@@ -118,6 +118,7 @@ def test_files_are_opened_and_refused(page):
     assert (status, len(json.loads(body)["strokes"])) == (200, 2)
     for name, data, words, headers in (
         ("a.png", b"\x89PNG", "picture", {}),
+        ("a.svg", b"", "empty", {}),
         ("a.svg", b"<", "simplify", {"Content-Length": "300000000"}),  # before it is read
     ):
         status, _, body = page.ask(f"open?name={name}", data, headers=headers)

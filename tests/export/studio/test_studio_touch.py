@@ -281,14 +281,3 @@ def test_selected_strokes_are_moved_copied_and_pasted_with_undo(empty):
     while find(empty, "#redo").is_enabled():
         find(empty, "#redo").click()
     assert spots(settled(empty)) == states[-1]
-
-
-def test_the_keyboard_alone_moves_a_stroke(empty):
-    empty.execute_script("document.querySelector('#drawing').focus()")
-    left, right = (["ARROW_LEFT"] * 10, ["ARROW_RIGHT"] * 20)
-    press(empty, *left, "SPACE", *right, "SPACE", *left[:5])
-    (before,) = spots(settled(empty))
-    press(empty, "v", "ENTER", "SPACE", *["ARROW_DOWN"] * 3, "SPACE")
-    (after,) = spots(settled(empty))
-    assert after[::2] == before[::2]
-    assert after[1] > before[1]
