@@ -363,6 +363,7 @@ class IntegerLandscape:
     def change(self, rows: Ints, steps: Ints) -> None:
         """Add steps (c,) to the integers with those numbers, each at most once."""
         self._residual = self.terms.step_residuals(self._residual, rows, steps)
+        self.p = self.p.copy()  # others may keep the integers so far
         self.p[rows] += steps
         self.energy = self.terms.total(self._residual)
 

@@ -9,7 +9,7 @@ from crossfield.models.orthogonal.greedy import find_forest_rows, round_greedily
 from crossfield.models.search import integer_search as search_module
 from crossfield.models.search.integer_search import IntegerSearch
 from meshes import box, flat_sheet, icosahedron, mesh_of, on_directions, on_edges, tetrahedron, torus
-from small_meshes import random_hull, random_mesh, try_all_integers
+from small_meshes import random_hull, random_mesh, strokeless, try_all_integers
 
 FINDERS = {
     "greedy": cf.greedy_field,
@@ -150,6 +150,17 @@ def test_a_round_repeats_its_bits():
         hunt.explore(lambda: False)
         best.append(hunt.best.p.tobytes())
     assert best[0] == best[1]
+
+
+def test_the_integers_of_a_round_stay_while_the_search_goes_on():
+    instance = strokeless(torus(16, 8))
+    energy = OrthogonalEnergy.of(instance)
+    start = energy.nearest(np.random.default_rng(6).uniform(0, 1.5, energy.size))
+    hunt = IntegerSearch(energy, instance.domain.rings, [start], 6)
+    hunt.explore(lambda: False)
+    best, total = hunt.best.p, hunt.best.energy
+    hunt.explore(lambda: False)
+    assert energy.least_total(best) == pytest.approx(total, rel=1e-12)
 
 
 def on_a_row(weight):
