@@ -7,16 +7,17 @@ from typing import Any, Final
 
 import numpy as np
 
-from ...models.field.field import FAR, CrossField
+from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.processes.child_program import is_stopped
-from ...models.surface.trust import OFF, UNFIT, right_angle_deviation
+from ...models.surface.trust import OFF, right_angle_deviation
 from ..pictures.draw import count_singularities
 from ..pictures.marks import split_runs
 from ..pictures.streamlines import streamlines
 from ..shading.raster import View, grid_box, view_of_box
 from ..surfaces.files import raster_surface
 from .document import Document
+from .meetings import find_suspects
 from .next_step import find_next_step
 from .session import DrawnInstance, OvertakenError, compute_field, compute_outline, compute_surface
 
@@ -25,8 +26,6 @@ _MOST_SIDE: Final = 8000  # pixels of a page with a small drawing, of which the 
 _RIM: Final = 2  # pixels of the grid round it that the picture shows: strokes may be wide
 _FINE: Final = 32767  # steps of a part of a normal: 8 bits would show as bands
 _SPACING: Final = 44  # streamlines of one family across the longer side of the grid
-_LEAST: Final = 2  # stroke pixels of a stroke about which there is a doubt
-_MOST: Final = 5  # strokes in doubt at a time, of those with at least half as many wrong pixels as the worst
 
 
 def load_module() -> None:
@@ -52,7 +51,7 @@ def next_step(data: bytes) -> dict[str, Any]:
 def _field_view(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     instance, (x, y), spots = drawn.instance, drawn.instance.origin, field.singularities
     pixel = instance.pixel_size
-    shape, deviation = field.shape, field.stroke_deviation
+    shape = field.shape
     return {
         "stage": "field",
         "size": max(instance.mask.shape),
@@ -68,7 +67,6 @@ def _field_view(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
                 spots.row.tolist(), spots.column.tolist(), spots.index.tolist(), strict=True
             )
         ],
-        "suspects": _find_suspects(drawn, deviation > FAR),
         "next": find_next_step(drawn.document),
         "numbers": {
             "pixels": instance.grid.size,
@@ -79,17 +77,6 @@ def _field_view(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
             "singularities": count_singularities(field),
         },
     }
-
-
-def _find_suspects(drawn: DrawnInstance, wrong: np.ndarray[Any, Any]) -> list[int]:
-    """Numbers of the few worst strokes with a doubt at most of their pixels."""
-    # Once these are marked as cuts, field and surface change, and others are often no longer in doubt.
-    stroke, at = drawn.strokes.T
-    count = np.bincount(stroke) if len(stroke) else np.zeros(1)
-    off = np.bincount(stroke, wrong[at], len(count))
-    off[(count < _LEAST) | (off <= count / 2)] = 0
-    worst = np.argsort(-off, kind="stable")[:_MOST]
-    return sorted(int(number) for number in worst if off[number] >= max(off.max() / 2, 1))
 
 
 def lines_step(field: CrossField) -> dict[str, Any]:
@@ -117,8 +104,10 @@ def surface_step(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     bands = [part for _, part in raster_surface(lifted, compute_outline(document, instance), view)]
     normals = np.concatenate([part.normals[..., :2] for part in bands])
     opacity = np.concatenate([part.opacity for part in bands])
-    off = right_angle_deviation(field, lifted.heights)
-    unfit = off > OFF
+    unfit, (stroke, at) = right_angle_deviation(field, lifted.heights) > OFF, drawn.strokes.T
+    strokes = len(document.strokes)
+    misfit = np.bincount(stroke, unfit[instance.stroke_index[at]], strokes)
+    misfit = misfit / np.maximum(np.bincount(stroke, minlength=strokes), 1)
     return {
         "stage": "surface",
         "size": max(instance.mask.shape),
@@ -133,7 +122,7 @@ def surface_step(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
         "columns": instance.mask.shape[1],
         "doubts": list(lifted.doubts),
         "freedom": list(lifted.freedom),
-        "suspects": _find_suspects(drawn, unfit[instance.stroke_index]) if unfit.mean() > UNFIT / 2 else [],
+        "suspects": find_suspects(document, misfit),
     }
 
 

@@ -217,10 +217,9 @@ function doubts() {
   };
   const { field, surface } = state;
   for (const text of field?.warnings ?? []) item(`Mask: ${text}.`, action("Areas", () => choose("area")), action("Paint the mask", () => choose("paint")));
-  const settled = surface && isDetermined(), known = isDetermined() ? [...field?.suspects ?? [], ...surface?.suspects ?? []] : [];
-  const some = [...new Set(known)].filter(k => state.doc.strokes[k]?.mark === "line");
+  const settled = surface && isDetermined(), some = (surface?.suspects ?? []).filter(k => state.doc.strokes[k]?.mark === "line");
   state.suspects = new Set(some);
-  if (some.length) item(some.length === 1 ? "1 stroke does not fit. Probably it is not a curvature line; otherwise it may be a hidden line." : `${some.length} strokes do not fit. Probably they are not curvature lines; otherwise they may be hidden lines.`,
+  if (some.length) item(some.length === 1 ? "1 stroke crosses lines that cross each other. Probably it is not a curvature line, or is hidden." : `${some.length} strokes cross lines that cross each other. Probably they are not curvature lines, or are hidden.`,
     action(some.length === 1 ? "Select it" : "Select them", () => select(some)), action(some.length === 1 ? "Mark as cut" : "Mark as cuts", () => { select(some); mark("cut"); }));
   for (const text of settled ? surface.doubts : []) item(`Surface: ${text}.`);
   for (const text of settled ? surface.freedom : []) item(`Your choice: ${text}.`, ...text.startsWith("inside out") ? [action("Flip", flip)] : []);

@@ -30,13 +30,13 @@ PEBBLE = {
     "silhouette": "none",
 }
 """A box with two curvature lines."""
-CONTRADICTING = [
+CROSSED = [
     PEBBLE["strokes"][0],
-    *({"points": [10, y, 110, y], "mark": "line", "weight": 1} for y in range(18, 88, 10)),
-    {"points": [30, 20, 50, 75], "mark": "line", "weight": 0.05},
-    {"points": [70, 75, 95, 20], "mark": "line", "weight": 0.05},
+    *({"points": [10, y, 110, y], "mark": "line", "weight": 1} for y in (30, 50, 70)),
+    *({"points": [x, 10, x, 90], "mark": "line", "weight": 1} for x in (35, 60, 85)),
+    {"points": [25, 20, 95, 83], "mark": "line", "weight": 1},
 ]
-"""Parallel lines, and two faint ones across them that no field follows."""
+"""A net of curvature lines, and a stroke aslant over it, which crosses lines of both families."""
 
 
 def changed(**parts) -> bytes:

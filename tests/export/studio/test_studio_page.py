@@ -20,7 +20,7 @@ from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
 from small_drawings import png
 from studio_pages import BOX, banner, document, drag, load, opened, pebble, press, settled, tool, until, write
-from studios import CONTRADICTING, PEBBLE, studio
+from studios import CROSSED, PEBBLE, studio
 
 pytestmark = pytest.mark.slow
 
@@ -485,9 +485,9 @@ def test_a_drawing_in_space_is_turned_by_dragging_also_after_a_reload(empty, tmp
 
 
 def test_a_doubt_is_followed_by_its_suggestion(empty, tmp_path):
-    browser = pebble(empty, tmp_path, strokes=CONTRADICTING, size=32)
-    assert "2 strokes do not fit" in find(browser, "#doubts").text
+    browser = pebble(empty, tmp_path, strokes=CROSSED, size=24)
+    assert "1 stroke crosses" in find(browser, "#doubts").text
     find(browser, "#doubts button:nth-of-type(2)").click()
     marks = [stroke["mark"] for stroke in document(settled(browser))["strokes"]]
-    assert marks == ["cut", *["line"] * 7, "cut", "cut"]
-    assert "do not fit" not in find(browser, "#doubts").text
+    assert marks == ["cut", *["line"] * 6, "cut"]
+    assert "stroke crosses" not in find(browser, "#doubts").text

@@ -16,13 +16,13 @@ from crossfield.export.studio.files import download
 from crossfield.export.studio.next_step import find_next_step
 from crossfield.export.studio.opening import open_drawing
 from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, hints_on_mask, read_drawn
-from crossfield.export.studio.views import field_step
+from crossfield.export.studio.views import field_step, surface_step
 from crossfield.models.sketch.samples import sample_svg
 from loops import for_each
 from photographs import assert_same_drawing, draw_sheet, encode, photograph
 from PIL import Image, ImageDraw
 from small_drawings import png
-from studios import CONTRADICTING, PEBBLE, changed
+from studios import CROSSED, PEBBLE, changed
 
 
 def document(**parts):
@@ -163,9 +163,70 @@ def test_hints_are_placed_on_pixels_and_those_outside_are_left_out():
     assert (hint.column, hint.row) == (column, row)
 
 
-def test_strokes_that_the_field_does_not_follow_are_suspects():
-    assert field_step(changed(strokes=CONTRADICTING, size=32))[0]["suspects"] == [8, 9]
-    assert field_step(changed(strokes=CONTRADICTING[:8], size=32))[0]["suspects"] == []
+def suspects(strokes, *, size=16):
+    _, drawn, field = field_step(changed(strokes=strokes, size=size))
+    return surface_step(drawn, field)["suspects"]
+
+
+def strokes_of(outline, *lines):
+    """An outline and curvature lines (k, 2), in units of 45 about the middle of the page."""
+    outline, *lines = (
+        line(*(np.array([60, 50]) + 45 * points).ravel().tolist()) for points in (outline, *lines)
+    )
+    return outline | {"mark": "cut"}, lines
+
+
+def ellipsoid_lines():
+    """Curvature lines of an ellipsoid from the front: it meets its confocal quadrics there (Dupin)."""
+    a, b, c = 1.0, 0.6, 0.2  # squares of the half axes
+
+    def quarter(m, n, right, down, step):
+        x = np.sqrt(a * (a - m) * (a - n) / ((a - b) * (a - c)))
+        y = np.sqrt(b * (b - m) * (n - b) / ((a - b) * (b - c)))
+        return np.stack([right * x, down * y], axis=1)[::step]
+
+    def ring(m):
+        n = np.linspace(b, a, 20)
+        sides = [(1, 1, 1), (-1, 1, -1), (-1, -1, 1), (1, -1, -1)]
+        return np.concatenate([quarter(m, n, *side) for side in sides])
+
+    def across(n, right):
+        m = np.linspace(c, b, 20)
+        return np.concatenate([quarter(m, n, right, 1, 1), quarter(m, n, right, -1, -1)])
+
+    lines = [ring(0.3), across(0.66, 1), across(0.66, -1), ring(0.42), across(0.85, 1), across(0.85, -1)]
+    return strokes_of(ring(c), *lines)
+
+
+def wave_lines():
+    """Curvature lines of a wave seen aslant: profiles, and rulings, which are straight."""
+    s, t = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-1, 1, 61))
+    place = np.stack([0.8 * t + 0.3 * s, 0.6 * s + 0.15 * np.sin(5 * t)], axis=2)
+    border = [place[:, 0], place[-1], place[::-1, -1], place[0, ::-1]]
+    return strokes_of(np.concatenate(border), place[:, 12], place[20], place[40], place[:, 28])
+
+
+@pytest.mark.slow
+@for_each("drawn_lines", [ellipsoid_lines, wave_lines])
+def test_no_curvature_line_is_suspected_while_one_after_another_is_drawn(drawn_lines):
+    outline, lines = drawn_lines()
+    for count in range(1, len(lines) + 1):
+        assert suspects([outline, *lines[:count]]) == []
+    assert suspects([outline, *lines, line(20, 75, 105, 25)]) == [1 + len(lines)]
+
+
+def test_a_stroke_that_crosses_lines_of_both_families_is_suspected():
+    assert suspects(CROSSED) == [7]
+    assert suspects(CROSSED[:7]) == []
+
+
+@for_each("begin", [0, -45])  # at the pole, and beyond it
+def test_lines_that_meet_at_a_pole_are_not_suspected(begin):
+    turns, round_ = np.radians(np.arange(0, 180, 30)), np.linspace(0, 2 * np.pi, 40)
+    arms = [np.outer([begin, 45], [np.cos(turn), np.sin(turn)]) for turn in turns]
+    rings = [radius * np.stack([np.cos(round_), np.sin(round_)], axis=1) for radius in (15, 30)]
+    lines = [line(*(np.array([60, 50]) + part).ravel().tolist()) for part in arms + rings]
+    assert suspects([OUTLINE, *lines]) == []
 
 
 def test_solver_files_come_with_their_manifest_or_a_reason():
