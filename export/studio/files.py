@@ -33,12 +33,6 @@ class Download:
     write: Callable[[Document, Path, str, str], Any]
 
 
-def _write_drawing(document: Document, folder: Path) -> Path:
-    path = folder / f"{document.name}.svg"
-    path.write_bytes(drawing_svg(document))
-    return path
-
-
 def drawing_svg(document: Document) -> bytes:
     """The visible strokes as SVG, as wide as their weight, in red for curvature lines and black for cuts."""
     x, y, width, height = (f"{value:.12g}" for value in document.sheet)
@@ -83,7 +77,10 @@ def _write_solver_files(document: Document, folder: Path, formulation: str, form
 
 
 DOWNLOADS: Final = {
-    "drawing": Download("Drawing (SVG)", lambda document, folder, *_: _write_drawing(document, folder)),
+    "drawing": Download(
+        "Drawing (SVG)",
+        lambda document, folder, *_: (folder / f"{document.name}.svg").write_bytes(drawing_svg(document)),
+    ),
     "layers": Download("Field in layers (SVG)", _write_layers),
     "overview": Download(
         "Overview (PNG)",

@@ -11,6 +11,7 @@ const COLOURS = {
     cursor: "#5cc3d6", suspect: "#f0a35e77", tints: ["#0000", "#6aa9f033", "#f5a5237a", "#0000"] },
 };
 const APART = 13; // pixels of the screen between crosses
+const MANY = 300, REST = 150; // strokes that are not drawn again while the view moves; milliseconds until it rests
 export const colours = () => COLOURS[dark.matches ? "dark" : "light"];
 
 /** A canvas with a view of the drawing: position of the origin and pixels per unit. */
@@ -18,6 +19,7 @@ export class View {
   constructor(canvas, changed) {
     this.canvas = canvas; this.box = [0, 0, 1, 1]; this.zoomed = false; this.cursor = null;
     this.base = document.createElement("canvas"); this.ink = document.createElement("canvas");
+    this.inkLater = () => { clearTimeout(this.rest); this.rest = setTimeout(() => { this.inked = null; changed(); }, REST); };
     new ResizeObserver(() => { this.resize(); changed(); }).observe(canvas);
     dark.addEventListener("change", changed);
     this.resize();
@@ -45,10 +47,9 @@ export class View {
     const place = this.canvas.getBoundingClientRect();
     return [(event.clientX - place.left - this.x) / this.scale, (event.clientY - place.top - this.y) / this.scale];
   }
-  begin(target, ...layers) {
+  begin(target) {
     const context = target.getContext("2d");
     context.setTransform(1, 0, 0, 1, 0, 0); context.clearRect(0, 0, target.width, target.height);
-    layers.forEach(layer => context.drawImage(layer, 0, 0));
     return this.place(context);
   }
   place(context) {
@@ -101,13 +102,22 @@ export function drawInk(context, strokes, colour, width) {
   paths.forEach((path, level) => { if (path) { context.lineWidth = width * shareOf(level / LEVELS); context.stroke(path); } });
 }
 
-/** Strokes in the colours of their marks, on a canvas of their own; strokes that were added are drawn onto those before.
- * widths: in pixels of the screen, by mark; strokes of other marks are left out. */
-export function inkOf(view, strokes, widths) {
-  const key = [view.x, view.y, view.scale, dark.matches].join(), { inked } = view;
-  const isLonger = inked?.key === key && inked.strokes.every((stroke, k) => stroke === strokes[k]);
-  const context = isLonger ? view.place(view.ink.getContext("2d")) : view.begin(view.ink), [left, top, right, bottom] = view.seen, thin = 1 / view.scale;
-  for (let k = isLonger ? inked.strokes.length : 0, first = k; k < strokes.length; first = k) {
+/** Puts strokes in the colours of their marks onto a picture. They are drawn on a canvas of their own: those that were added onto
+ * those before, and many of them, while the view moves, as they were. widths: in pixels of the screen, by mark; others are left out. */
+export function putInk(target, view, strokes, widths) {
+  const { inked } = view, isLonger = inked?.dark === dark.matches && inked.strokes.every((stroke, k) => stroke === strokes[k]);
+  const isStill = isLonger && ["x", "y", "scale"].every(name => inked[name] === view[name]);
+  if (isLonger && !isStill && strokes.length > MANY && strokes.length === inked.strokes.length) view.inkLater();
+  else drawInkOf(view, strokes, widths, isStill ? inked.strokes.length : 0);
+  const { x, y, scale } = view.inked, by = view.scale / scale;
+  target.setTransform(by, 0, 0, by, view.ratio * (view.x - by * x), view.ratio * (view.y - by * y));
+  target.drawImage(view.ink, 0, 0); view.place(target);
+}
+
+/** Draws strokes from a number on onto the canvas of a view's ink. */
+function drawInkOf(view, strokes, widths, start) {
+  const context = start ? view.place(view.ink.getContext("2d")) : view.begin(view.ink), [left, top, right, bottom] = view.seen, thin = 1 / view.scale;
+  for (let k = start, first = k; k < strokes.length; first = k) {
     const { mark } = strokes[first], run = [];
     for (; strokes[k]?.mark === mark; k++) {
       const box = boxOf(strokes[k]);
@@ -116,8 +126,7 @@ export function inkOf(view, strokes, widths) {
     context.setLineDash(mark === "ignored" ? [4 * thin, 4 * thin] : []);
     if (widths[mark]) drawInk(context, run, colours()[mark], widths[mark] * thin);
   }
-  view.inked = { key, strokes };
-  return view.ink;
+  view.inked = { strokes, x: view.x, y: view.y, scale: view.scale, dark: dark.matches };
 }
 
 /** A small picture with a pixel per pixel of the grid. */
@@ -208,8 +217,10 @@ const WIDTHS = { ignored: 1.4, cut: 2.6, line: 2.6 };
 /** Copies the hidden canvases and draws what follows the pointer. live: the tool in use, with what it has done so far. */
 export function paint(view, { live, brush, doc, chosen, field, mode, spot }) {
   const isStill = (_, k) => !live?.shift || !chosen.has(k), ink = colours(), thin = 1 / view.scale;
-  const context = view.begin(view.canvas, view.base, inkOf(view, doc.strokes.filter(isStill), WIDTHS));
-  for (const stroke of doc.strokes.filter((_, k) => !isStill(_, k))) drawInk(context, [stroke], ink[stroke.mark], WIDTHS[stroke.mark] * thin);
+  const context = view.begin(view.canvas);
+  context.setTransform(1, 0, 0, 1, 0, 0); context.drawImage(view.base, 0, 0);
+  putInk(context, view, doc.strokes.filter(isStill), WIDTHS);
+  for (const mark in WIDTHS) drawInk(context, doc.strokes.filter((stroke, k) => stroke.mark === mark && !isStill(stroke, k)), ink[mark], WIDTHS[mark] * thin);
   if (field && mode !== "none") for (const [x, y, index] of field.singularities) {
     context.fillStyle = index > 0 ? ink.plus : ink.minus;
     context.beginPath(); context.arc(x, y, 5 * thin, 0, 7); context.fill();

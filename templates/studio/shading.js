@@ -1,6 +1,6 @@
 // The right picture: the surface as normal map, in the light of a lamp, or in the material of a glazed ball.
 
-import { colours, gridPicture, inkOf } from "./drawing.js";
+import { colours, gridPicture, putInk } from "./drawing.js";
 
 const AMBIENT = 0.04, VIEWER = 0.10, LAMP = 0.95, FILL = 0.08, CLAY = [0.80, 0.77, 0.73]; // as export/shading/colours.py
 export const LAMP_AT = { azimuth: 130 * Math.PI / 180, elevation: 38 * Math.PI / 180 };
@@ -77,9 +77,9 @@ export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strok
     context.globalCompositeOperation = "source-over";
   }
   const reach = reachOf(frame), thin = 1 / view.scale;
-  context.globalAlpha = 0.7; context.setTransform(1, 0, 0, 1, 0, 0);
-  if (surface) context.drawImage(inkOf(view, strokes, { cut: 1.5, line: 1.5 }), 0, 0);
-  context.globalAlpha = 1; view.place(context);
+  context.globalAlpha = 0.7;
+  if (surface) putInk(context, view, strokes, { cut: 1.5, line: 1.5 });
+  context.globalAlpha = 1;
   for (const hint of live ? [...hints, live] : hints) {
     const [x, y] = tipOf(hint, reach), angle = hint.tilt * Math.PI / 180;
     for (const [colour, width] of [["#fffc", 5], [colours().minus, 2.5]]) {
