@@ -20,7 +20,7 @@ from ..instance.angles import line_of
 from ..instance.domain import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
 from .bitmap import Bitmap, read_white_pixels
-from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
+from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, curve_pixels, fit_frame
 from .curves import Curves
 from .doubts import (
     describe_crowding,
@@ -34,6 +34,8 @@ from .parallels import describe_lines_across, leave_out_parallels
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
+_OVERSHOOT: Final = 0.25  # of the length of a line: a longer part of it is no mere overshoot
+_DEEP: Final = 2.0  # pixels from the border of an area: an end that is nearer runs through it
 
 Silhouette = Literal["none", "outer"]
 
@@ -181,7 +183,10 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
     if not walls.any():
         raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
     region = find_inside(walls)
-    mask = keep_parts_with_strokes(region & ~covers.cuts, covers.lines.weight)
+    inner, weight = region & ~covers.cuts, covers.lines.weight
+    mask = overshot = keep_parts_with_strokes(inner, weight)
+    if isinstance(drawing, Curves):
+        mask = keep_parts_with_strokes(inner, np.where(find_overshoots(drawing, inner, frame), 0.0, weight))
     if not mask.any():
         raise NoStrokeError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
@@ -190,10 +195,50 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
         *drawing.notes,
         describe_open_drawing(region),
         describe_lines_across(drawing, region, frame) if isinstance(drawing, Curves) else None,
+        _describe_overshot_parts(overshot & ~mask, frame),
         describe_loose_strokes(walls, region, frame),
         describe_crowding(covers.filled, mask, frame),
     )
     return mask, Reading(drawing.page, warnings)
+
+
+def find_overshoots(curves: Curves, area: Bools, frame: Frame) -> Bools:
+    """The pixels [height, width] of an area that only ends of curvature lines reach.
+
+    Such an end lies inside of a part of the area, and most of its line in other parts.
+    """
+    from scipy import ndimage
+
+    label, count = ndimage.label(area)
+    segments, curve, is_line = curves.segments(frame)
+    owner, row, column = curve_pixels(segments[is_line], curve[is_line], frame, LEAST_WEIGHT)
+    piece, place, size = np.unique(
+        owner * (count + 1) + label[row, column], return_inverse=True, return_counts=True
+    )
+    step = np.diff(curves.curve, prepend=-1, append=-1) != 0
+    at = np.concatenate([curves.points[step[:-1], 0], curves.points[step[1:], 3]])
+    x, y = (
+        np.floor((at - (frame.x, frame.y)) / frame.pixel)
+        .astype(int)
+        .clip(0, np.array(area.shape[::-1]) - 1)
+        .T
+    )
+    deep = (ndimage.distance_transform_edt(area) >= _DEEP)[y, x]
+    ends = np.tile(curves.curve[step[:-1]], 2)[deep] * (count + 1) + label[y, x][deep]
+    is_end = np.isin(piece, ends) & (size < _OVERSHOOT * np.bincount(owner)[piece // (count + 1)])
+    passed = np.zeros((2, *area.shape), dtype=bool)
+    passed[is_end[place].astype(int), row, column] = True
+    return np.asarray(passed[1] & ~passed[0])
+
+
+def _describe_overshot_parts(lost: Bools, frame: Frame) -> str | None:
+    if not lost.any():
+        return None
+    y, x = (np.argwhere(lost).mean(axis=0) + 0.5) * frame.pixel + (frame.y, frame.x)
+    return (
+        f"the area round ({x:.4g}, {y:.4g}) is left out, as only ends of curvature lines reach into it; if "
+        "it belongs to the surface, draw a line of its own there"
+    )
 
 
 def _list_warnings(*doubts: str | None) -> tuple[str, ...]:
