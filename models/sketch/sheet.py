@@ -30,6 +30,8 @@ _NEAR: Final = 2  # pixels beyond a side from which on there must be something e
 _FAR: Final = 40  # pixels beyond a side up to which there must
 _STEP: Final = 0.1  # least difference from the sheet, relative to its brightness
 _SAME: Final = 0.02  # difference of colours that is noise
+_EVEN: Final = 0.004  # one level: half of a photographed table differs by more from its usual colour
+_OTHERS: Final = 0.25  # of the ink of a sheet: more ink outside of it belongs to the drawing
 _DARK: Final = 0.1  # brightness below which differences count less
 _SUPPORT: Final = 0.75  # least share of a side, and of the places beyond it, with other colours
 _BORDER: Final = 4.0  # pixels between a side and the border of a picture that cuts the sheet there
@@ -71,7 +73,7 @@ class PhotographedSheet:
         """
         if self.size is not None:
             return self.straighten(pixels, reduction)
-        on_sheet = self._find_pixels((pixels.shape[0], pixels.shape[1]), reduction)[..., None]
+        on_sheet = self.find_pixels((pixels.shape[0], pixels.shape[1]), reduction)[..., None]
         return np.where(on_sheet, pixels, np.median(pixels[on_sheet[..., 0]], axis=0).astype(np.uint8))
 
     def straighten(self, pixels: NDArray[np.uint8], reduction: int) -> NDArray[np.uint8]:
@@ -101,7 +103,7 @@ class PhotographedSheet:
             )
         return f"the sheet in the photo was straightened (corners at {corners})"
 
-    def _find_pixels(self, shape: tuple[int, int], reduction: int) -> Bools:
+    def find_pixels(self, shape: tuple[int, int], reduction: int) -> Bools:
         """Which pixels of a picture of this shape, reduced by a factor, lie on the sheet."""
         y, x = ((np.arange(side) + 0.5) * reduction for side in shape)
         on = np.ones(shape, dtype=bool)
@@ -137,12 +139,24 @@ def find_sheet(coarse: NDArray[np.uint8], factor: int, picture: tuple[int, int])
         score = not quad.is_cut.any(), quad.rate()
         if score[1] > 0 and score > most:
             best, most = quad, score
-    if best is None:
+    if best is None or _is_one_of_several(best):
         return None
     corners = factor * best.shrink()
     return PhotographedSheet(
         corners, picture, None if best.is_cut.any() else _estimate_size(corners, picture)
     )
+
+
+def _is_one_of_several(quad: _Quad) -> bool:
+    """Whether a quadrilateral lies on even ground, unlike in photos, and much of the ink outside of it."""
+    height, width = quad.colours.shape[:2]
+    around = PhotographedSheet(quad.offset_sides(np.full((4, 2), 2.0 * _WIDE)), (width, height), None)
+    inside = around.find_pixels((height, width), 1)
+    parts = [quad.colours[area] for area in (inside, ~inside)]
+    ink, outer = (np.abs(part - np.median(part, axis=0)).max(axis=-1) for part in parts)
+    if not len(outer) or (outer < _EVEN).mean() < 0.5:
+        return False
+    return bool((outer > _STEP).sum() > _OTHERS * (ink > _STEP).sum())
 
 
 def _list_regions(colours: Floats) -> Iterator[Bools]:

@@ -89,6 +89,22 @@ def test_paper_to_the_border_is_left_as_it_is(light, boxed):
     assert instance.reading.page == (0, 0, pixels.shape[1], pixels.shape[0])
 
 
+@for_each(
+    "paper, fills",
+    [("white", ("#ffe8a3", "#a5d8ff")), ("#334", ("white", "white")), ("white", ("#ffe8a3", "white"))],
+)
+def test_two_cards_of_a_drawing_are_no_sheets(paper, fills):
+    image = Image.new("RGB", (900, 500), paper)
+    pen = ImageDraw.Draw(image)
+    for x, fill in zip((60, 500), fills, strict=True):
+        pen.rounded_rectangle((x, 80, x + 340, 420), 12, fill, "black", 2)
+        pen.ellipse((x + 50, 130, x + 290, 370), outline="black", width=3)
+        pen.line((x + 70, 250, x + 270, 250), "red", 3)
+    instance = read(png(image), 48, "a.png")
+    assert (instance.reading.page, instance.grid.parts) == ((0, 0, 900, 500), 2)
+    assert not any("sheet" in warning for warning in instance.reading.warnings)
+
+
 def test_page_and_masks_of_a_straightened_sheet(tmp_path):
     """All grids are on one page, and a mask may have the pixels of the sheet or of the photograph."""
     pixels = photograph(draw_sheet("mouse"), "dark", turn=15, pitch=20)
