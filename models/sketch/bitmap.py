@@ -19,13 +19,15 @@ from numpy.typing import NDArray
 from ..errors import InputError, shortened
 from ..input_limits import MAX_PIXELS, MAX_SIDE
 from ..instance.domain import Bools, Floats
-from .colour import REDDISH, ink_of, redness
+from .colour import PAPER, REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
 from .paper import Ink, relative_to_paper
 from .sheet import SIDE, PhotographedSheet, find_sheet
 
 FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
 """Formats that Pillow decodes by itself, without starting other programs."""
+_PAGED: Final = ("TIFF", "GIF", "WEBP", "PNG")
+"""Formats whose files may have several pages that are drawings, unlike previews of a JPEG."""
 _ENOUGH: Final = 8  # picture pixels per grid pixel; finer pictures are reduced by whole factors
 _WORKING_SIDE: Final = 2048
 _MOST_INK: Final = 0.5  # of the picture; strokes leave more paper
@@ -53,7 +55,7 @@ class Bitmap:
     ink: [h, w], 0 for paper to 1 for ink as dark as the strokes. red: [h, w] in [0, 1], the part of the ink
     that is red. pixels: uint8 [h, w, 1 or 3], the picture on white. reduction: pixels of the file per pixel
     of these arrays in each direction. width, height: in pixels of the file. sheet: the sheet in a photograph;
-    all else then refers to the straightened sheet.
+    all else then refers to the straightened sheet. pages: of the file, of which the first is read.
     """
 
     ink: Ink
@@ -63,11 +65,13 @@ class Bitmap:
     width: int
     height: int
     sheet: PhotographedSheet | None = None
+    pages: int = 1
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Changes made while reading, one line each."""
-        return () if self.sheet is None else (self.sheet.describe(),)
+        pages = (_describe_pages(self.pages),) if self.pages > 1 else ()
+        return pages if self.sheet is None else (*pages, self.sheet.describe())
 
     @property
     def page(self) -> Box:
@@ -159,6 +163,7 @@ def stroke_directions(ink: Ink, width: float) -> Ink:
 def read_bitmap(data: bytes, size: int) -> Bitmap:
     """The ink of a bitmap, fine enough for a grid of `size` pixels. Raises InputError for other content."""
     image = _open_image(data)
+    pages = getattr(image, "n_frames", 1) if image.format in _PAGED else 1
     width, height = image.size
     # The sheet must not depend on the size, so that all grids are on one page.
     factor = -(-max(width, height) // SIDE)
@@ -175,6 +180,7 @@ def read_bitmap(data: bytes, size: int) -> Bitmap:
     if strongest < _FAINTEST:
         raise InputError(
             "shows no stroke: it is paper all over; expected strokes that are darker or lighter than it"
+            + (f"; {_describe_pages(pages)}" if pages > 1 else "")
         )
     red = _find_red(rgb, raw)
     level = _typical_ink(raw)
@@ -194,7 +200,11 @@ def read_bitmap(data: bytes, size: int) -> Bitmap:
             f"shows ink on {covered:.0%} of the paper, and strokes would leave most of it bare; "
             "crop it to the drawing, take the picture in brighter light, or thin the strokes"
         )
-    return Bitmap(ink, red.astype(np.float32), pixels, reduction, width, height, sheet)
+    return Bitmap(ink, red.astype(np.float32), pixels, reduction, width, height, sheet, pages)
+
+
+def _describe_pages(count: int) -> str:
+    return f"the file has {count} pages, and page 1 is read; save another page as a file of its own"
 
 
 def read_white_pixels(data: bytes) -> Bools:
@@ -247,8 +257,20 @@ def _reduce_image(image: Any, factor: int) -> NDArray[np.uint8]:
     image = image if image.mode == mode else image.convert(mode)
     image = image.reduce(factor) if factor > 1 else image
     if has_alpha:
-        image = Image.alpha_composite(Image.new("RGBA", image.size, "white"), image).convert("RGB")
+        ground = "black" if _has_light_ink(np.asarray(image)) else "white"
+        image = Image.alpha_composite(Image.new("RGBA", image.size, ground), image).convert("RGB")
     return np.asarray(image).reshape(*image.size[::-1], -1)
+
+
+def _has_light_ink(pixels: NDArray[np.uint8]) -> bool:
+    """Whether most strokes on a transparent ground, uint8 [h, w, 4], are as light as white paper."""
+    ink = pixels[..., 3] / np.float32(255)
+    light = np.where(pixels[..., :3].min(axis=-1) > 255 * (1 - PAPER), ink, 0)
+    return bool(
+        ink.mean() < _MOST_INK
+        and light.sum() > ink.sum() / 2
+        and measure_width(light) < _SHORTEST * max(ink.shape)
+    )
 
 
 def _find_specks(ink: Ink, width: float) -> Bools:

@@ -17,7 +17,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, shortened
 from ..input_limits import MAX_LENGTH, MAX_RULE_CHECKS, MAX_STYLE
 from .colour import hex_colour
 
@@ -32,9 +32,11 @@ _KEYWORDS: Final = frozenset({"none", "currentcolor", "inherit", "context-fill",
 _INITIAL: Final = {"stroke": "none"}  # black for the others
 UNSHOWN: Final = re.compile(r"filter|marker|stroke-dash|mix-blend|isolation|font|animation|transition|-")
 """Beginnings of properties that the pictures of a drawing do without."""
+_STYLING: Final = ("import", "container", "scope")
+"""Rules of style sheets that may style elements, and are not read."""
 _LIGHT: Final = re.compile(r"light-dark\(\s*((?:[^(),]|\([^()]*\))*),.*\)", re.DOTALL)
 _VARIABLE: Final = re.compile(r"var\(\s*(--[\w-]+)\s*(?:,\s*((?:[^()]|\([^()]*\))*))?\)")
-_DEEPEST: Final = 10  # variables inside of variables
+_DEEPEST: Final = 10  # variables inside of variables, and rules inside of rules
 
 _Declared = tuple[str, str, bool]
 """Name, value, and whether it is important."""
@@ -45,12 +47,13 @@ class Cascade:
     """The rules of a drawing.
 
     combinators: of each selector, by its order, how often it tries all ancestors and all siblings. unread: an
-    element and its colour, for each colour that cannot be read.
+    element and its colour, for each colour that cannot be read. skipped: rules that are not read.
     """
 
     matcher: Any
     combinators: dict[int, tuple[int, int]] = field(default_factory=dict)
     unread: dict[Element, str] = field(default_factory=dict)
+    skipped: list[str] = field(default_factory=list)
     checks: int = 0
 
     def declare(self, root: Element) -> dict[Element, dict[str, str]]:
@@ -134,29 +137,53 @@ def cascade_of(texts: Iterable[str]) -> Cascade:
     return cascade
 
 
-def _add_rules(cascade: Cascade, rules: Iterable[Any]) -> None:
-    import cssselect2
+def _add_rules(cascade: Cascade, rules: Iterable[Any], around: str = "") -> None:
+    """Add rules, which may be nested in that of a selector. Layers count in the order of the sheet."""
     import tinycss2
 
     for rule in rules:
-        if rule.type == "at-rule" and rule.lower_at_keyword == "media" and rule.content is not None:
-            if _text(rule.prelude).lower() in ("", "all", "screen"):
-                inner = tinycss2.parse_rule_list(rule.content, skip_comments=True, skip_whitespace=True)
-                _add_rules(cascade, inner)
-        elif rule.type == "qualified-rule" and (declared := _declared(rule.content)):
-            if ":has(" in _text(rule.prelude):  # which tries all elements inside
+        kind = rule.lower_at_keyword if rule.type == "at-rule" else ""
+        if rule.type == "qualified-rule":
+            text = _text(rule.prelude)
+            if around:
+                text = text.replace("&", f":is({around})") if "&" in text else f":is({around}) {text}"
+            if declared := _declared(rule.content):
+                _add_selector(cascade, text, declared)
+            if text.count(":is(") > _DEEPEST:
                 continue
-            try:
-                selectors = cssselect2.compile_selector_list(rule.prelude)
-            except (cssselect2.SelectorError, RecursionError, MemoryError, SyntaxError):
-                continue
-            # A comma in parentheses is part of a selector, whose combinators multiply.
-            lists = groupby(rule.prelude, lambda part: part == ",")
-            parts = [_combinators(_text(list(part))) for is_comma, part in lists if not is_comma]
-            bounds = np.max(parts, axis=0)
-            for selector in selectors:
-                cascade.matcher.add_selector(selector, declared)
-                cascade.combinators[cascade.matcher.order] = tuple(bounds.tolist())
+            inner = tinycss2.parse_blocks_contents(rule.content, skip_comments=True, skip_whitespace=True)
+            _add_rules(cascade, [part for part in inner if part.type.endswith("-rule")], text)
+        elif kind in ("layer", "supports") or (
+            kind == "media" and _text(rule.prelude).lower() in ("", "all", "screen")
+        ):
+            content = f"{around}{{{_text(rule.content or [])}}}" if around else rule.content or []
+            _add_rules(cascade, tinycss2.parse_rule_list(content, skip_comments=True, skip_whitespace=True))
+        elif kind in _STYLING:
+            cascade.skipped.append(shortened(f"@{kind} {_text(rule.prelude)}".strip(), 40))
+
+
+def _add_selector(cascade: Cascade, text: str, declared: tuple[_Declared, ...]) -> None:
+    """Add a rule that matches a list of selectors; one that cannot be read is recorded."""
+    import cssselect2
+    import tinycss2
+
+    prelude = tinycss2.parse_component_value_list(text)
+    try:
+        # :has() tries all elements inside, and rules may be nested too deep.
+        is_hard = ":has(" in text or (text.count(":is(") > _DEEPEST)
+        selectors = [] if is_hard else cssselect2.compile_selector_list(prelude)
+    except (cssselect2.SelectorError, RecursionError, MemoryError, SyntaxError):
+        selectors = []
+    if not selectors:
+        cascade.skipped.append(shortened(text, 40))
+        return
+    # A comma in parentheses is part of a selector, whose combinators multiply.
+    lists = groupby(prelude, lambda part: part == ",")
+    parts = [_combinators(_text(list(part))) for is_comma, part in lists if not is_comma]
+    bounds = np.max(parts, axis=0)
+    for selector in selectors:
+        cascade.matcher.add_selector(selector, declared)
+        cascade.combinators[cascade.matcher.order] = tuple(bounds.tolist())
 
 
 def _combinators(selector: str) -> tuple[int, int]:

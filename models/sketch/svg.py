@@ -32,7 +32,7 @@ from ..input_limits import (
 )
 from ..instance.angles import transform_vectors, vector_length
 from ..instance.domain import Bools, Floats
-from .cascade import UNSHOWN, background_of, cascade_of
+from .cascade import UNSHOWN, Cascade, background_of, cascade_of
 from .colour import PAPER, is_red
 from .cover import Box
 from .curves import STRAIGHT, Curves, lines_as_cubics, run_numbers
@@ -131,11 +131,14 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     _paint_background(root, styles, page)
     walk = _ElementWalk(_put_styles(root, styles), matcher)
     painted = list(walk.shapes(root, page))
-    unread = _list_unread(pictured, cascade.unread, walk)
+    unread = _list_unread(pictured, cascade, walk)
     shapes = _leave_out_areas(painted, page, matcher)
     pens = _find_filled_strokes([shape for shape in painted if len(shape.points)])
     if not pens and not sum(len(shape.points) for shape in shapes):
-        reason = "; ".join(unread) or "it has no visible path, line or shape; export it again"
+        areas, texts = len(painted), sum(tag_of(element) == "text" for element in root.iter())
+        causes = [f"it has areas without a stroke, {areas} in all"] if areas else []
+        causes += [f"it has text, {texts} in all; convert it to paths"] if texts else []
+        reason = "; ".join([*unread, *causes]) or "it has no visible path, line or shape; export it again"
         raise NoStrokeError(f"draws no stroke: {reason}")
     window = page.window if page else window_around(painted)
     side, framing = choose_side(root, window, painted), (page, window)
@@ -277,10 +280,12 @@ def _leave_out_areas(
     the outer areas count as strokes.
     """
     kept = [shape if shape.is_stroked else replace(shape, points=shape.points[:0]) for shape in shapes]
+    grounds = [shape.paint for shape in shapes if shape.is_filled and _covers_page(shape, page)]
+    paper = np.array(opaque_colour(grounds[-1] if grounds else "#ffffff"))
     areas = [
         number
         for number, shape in enumerate(shapes)
-        if len(shape.points) and not (shape.is_stroked or _is_ground(shape, page))
+        if len(shape.points) and not (shape.is_stroked or _is_ground(shape, page, paper))
     ]
     if areas and all(_is_curvature_line(shape, matcher) for shape in kept if len(shape.points)):
         for number in _find_silhouettes(shapes, areas):
@@ -301,11 +306,11 @@ def _find_silhouettes(shapes: Sequence[PaintedShape], areas: Sequence[int]) -> l
     return [areas[place] for place in outer]
 
 
-def _is_ground(shape: PaintedShape, page: DrawingPage | None) -> bool:
-    """Whether a filled shape is the ground of a drawing: as white as paper, or as large as the page."""
-    rgb = opaque_colour(shape.paint[:7])
+def _is_ground(shape: PaintedShape, page: DrawingPage | None, paper: Floats) -> bool:
+    """Whether a filled shape is the ground of a drawing: as pale as the paper, or as large as the page."""
+    rgb = np.array(opaque_colour(shape.paint[:7]))
     opacity = int(shape.paint[7:], 16) / 255 if shape.paint[7:] and not np.isnan(rgb).any() else 1.0
-    return opacity * (1 - min(rgb)) < PAPER or _covers_page(shape, page)
+    return bool(opacity * np.abs(paper - rgb).max() < PAPER) or _covers_page(shape, page)
 
 
 def _covers_page(shape: PaintedShape, page: DrawingPage | None) -> bool:
@@ -384,7 +389,7 @@ def _find_faint(seen: Sequence[Seen], is_line: Bools) -> Bools:
 
 
 def _list_unread(
-    styles: Mapping[Element, Mapping[str, str]], unread: Mapping[Element, str], walk: _ElementWalk
+    styles: Mapping[Element, Mapping[str, str]], cascade: Cascade, walk: _ElementWalk
 ) -> tuple[str, ...]:
     """Notes on the pictures, faults, colours and transforms of a drawing that were not read."""
     pictures = [
@@ -394,11 +399,12 @@ def _list_unread(
     ]
     colours, transforms = (
         [f"{shortened(text, 40)!r} of {name_of(element)}" for element, text in texts.items()]
-        for texts in (unread, walk.unused)
+        for texts in (cascade.unread, walk.unused)
     )
     notes = (
         (pictures, "picture", "left out", "give a picture as a file of its own to trace it"),
         (walk.faults, "shape", "faulty and left out from the fault on", "export the drawing again"),
+        (cascade.skipped, "style rule", "not read", "write its styles into the elements"),
         (colours, "colour", "not understood", "write #rrggbb"),
         (transforms, "transform", "not understood", "apply it in the drawing program"),
     )

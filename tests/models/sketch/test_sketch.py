@@ -240,9 +240,13 @@ def dusty(image):
     return png(image)
 
 
+BLANK = Image.new("L", (200, 200), 255)
 PICTURES = {
     "palette with transparent paper": lambda im: png(im.convert("P"), transparency=255),
     "transparent paper": lambda im: png(Image.merge("LA", (Image.new("L", im.size, 0), ImageOps.invert(im)))),
+    "light ink, transparent paper": lambda im: png(
+        Image.merge("LA", (im.point(lambda _: 255), ImageOps.invert(im)))
+    ),
     "rgba with black transparent paper": lambda im: png(
         Image.merge("RGBA", (*[Image.new("L", im.size, 0)] * 3, ImageOps.invert(im)))
     ),
@@ -251,7 +255,7 @@ PICTURES = {
     "grey paper": lambda im: png(im.point(lambda v: 40 + v * 0.6)),
     "faint pencil": lambda im: png(im.point(lambda v: 180 + v * 75 / 255)),
     "dust at the border": dusty,
-    "tiff": lambda im: png(im, "TIFF"),
+    "tiff": lambda im: png(im, "TIFF", save_all=True, append_images=[BLANK]),
     "webp": lambda im: png(im, "WEBP", lossless=True),
     "bmp": lambda im: png(im, "BMP"),
 }
