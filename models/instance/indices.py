@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -28,12 +27,11 @@ class PrescribedRings(Walks):
 
 
 def sort_indices(values: Any) -> Ints | None:
-    """The pairs of a vertex and four times its index, ascending, (k, 2); None without any.
+    """The pairs of a vertex and four times its index, ascending, (k, 2), read-only; None without any.
 
     Raises InstanceError for other values, and for a vertex that comes twice.
     """
-    pairs = whole_numbers(list(values) if isinstance(values, Iterable) else values, "indices")
-    if not pairs.size:
+    if values is None or not (pairs := whole_numbers(values, "indices")).size:
         return None
     if pairs.ndim != 2 or pairs.shape[1] != 2:
         raise InstanceError(
@@ -42,6 +40,7 @@ def sort_indices(values: Any) -> Ints | None:
     pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
     if (twice := np.diff(pairs[:, 0]) == 0).any():
         raise InstanceError(f"indices list vertex {pairs[1:, 0][twice][0]} twice; give each vertex once")
+    pairs.setflags(write=False)
     return pairs
 
 

@@ -282,11 +282,8 @@ class Instance(Pictured):
             )
 
     def _check_indices(self) -> None:
-        if self.indices is None:
-            return
-        indices = sort_indices(self.indices)
-        object.__setattr__(self, "indices", None if indices is None else _read_only(indices))
-        if indices is not None and not (self.orthogonal and self.gauge == "strokes"):
+        object.__setattr__(self, "indices", sort_indices(self.indices))
+        if self.indices is not None and not (self.orthogonal and self.gauge == "strokes"):
             raise InstanceError(
                 "indices are prescribed for orthogonal crosses under the gauge strokes only; make the "
                 "instance orthogonal, or leave indices out"
@@ -361,16 +358,13 @@ class Instance(Pictured):
     @cached_property
     def cycles(self) -> Cycles:
         """A basis of the cycles of pairs and strokes, along which alone jumps matter."""
-        prescribed = self.prescribed_rings
-        wanted = None if prescribed is None else prescribed.number
-        return find_cycles(self.domain, self.stroke_index, wanted)
+        rings = self.prescribed_rings
+        return find_cycles(self.domain, self.stroke_index, None if rings is None else rings.number)
 
     @cached_property
     def prescribed_rings(self) -> PrescribedRings | None:
         """The rings of vertices with prescribed indices; None without any."""
-        if self.indices is None:
-            return None
-        return prescribe_rings(self.domain, self.indices)
+        return None if self.indices is None else prescribe_rings(self.domain, self.indices)
 
     @cached_property
     def alpha_lower(self) -> Floats:

@@ -76,6 +76,10 @@ class OrthogonalEnergy(RightAngles):
         """Whether steps (c,) of the integers of rows, each at most once, keep all prescribed sums."""
         return not self.held[rows].any() or not (self.sums[:, rows] @ steps).any()
 
+    def has_sums(self, z: Ints) -> bool:
+        """Whether integers have the prescribed sums."""
+        return self.sums is None or bool((self.sums @ z == self.turns_along).all())
+
     def with_sums(self, z: Ints) -> Ints:
         """The integers with the prescribed sums; what a ring lacks goes the shortest way to a free ring."""
         if self.sums is None:

@@ -91,7 +91,7 @@ def prove(
         For another norm, one other than 2 where crosses are orthogonal, weights of pairs where they are
         not, and for too few or too many jobs or threads.
     InstanceError
-        For a start on another instance.
+        For a start on another instance, and where no field is found that has the prescribed indices.
     SolverError
         When the functions of proofs cannot be compiled.
 

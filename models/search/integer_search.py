@@ -80,6 +80,8 @@ def _explore(
     """The lowest landscape of 500 perturbations; rings: of the rows."""
     if not len(land.p):
         return land
-    terms, least = land.terms, land.bounded_energy
-    perturbations = Perturbations(rings, terms.size, terms.first, terms.second, terms.keeps_sums)
+    least, perturbations = (
+        land.bounded_energy,
+        Perturbations(rings, land.terms.size, land.terms.first, land.terms.second),
+    )
     return explore_from(land, perturbations, rng, least=least, count=_KICKS, is_over=is_over)[0] or land

@@ -125,11 +125,6 @@ class Landscape:
         return FieldPoint(self.defined_energy(inside), self._with_patch(inside), self.p.copy())
 
     @property
-    def to_beat(self) -> float:
-        """The energy that a walk has to lower."""
-        return self.energy
-
-    @property
     def bounded_energy(self) -> float:
         """The energy by definition of the field within its bounds."""
         return self.point.energy
@@ -341,8 +336,6 @@ class IntegerLandscape:
         """The energy by definition: no angle has bounds, residuals have limits with prescribed indices."""
         return self.energy if self.terms.sums is None else self.terms.least_total(self.p)
 
-    to_beat = bounded_energy
-
     @property
     def offsets(self) -> Floats:
         """The turn of labels of each row, (r,), in radians."""
@@ -361,7 +354,9 @@ class IntegerLandscape:
         self.change(np.array([place]), self.terms.better_steps(self._residual[[place]]))
 
     def change(self, rows: Ints, steps: Ints) -> None:
-        """Add steps (c,) to the integers with those numbers, each at most once."""
+        """Add steps (c,) to the integers with those numbers, each at most once, if they keep all sums."""
+        if not self.terms.keeps_sums(rows, steps):
+            return
         self._residual = self.terms.step_residuals(self._residual, rows, steps)
         self.p = self.p.copy()  # others may keep the integers so far
         self.p[rows] += steps

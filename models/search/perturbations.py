@@ -8,7 +8,6 @@ example around a handle. `change_neighbours` changes neighbouring rows.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
 from typing import Final
 
 import numpy as np
@@ -25,26 +24,15 @@ _SINGULAR: Final = 0.6  # share of the walks that begin at a singularity
 _BEND: Final = 0.3  # share of the rings in which a walk does not go straight on
 _ROWS: Final = 0.3  # share of the perturbations that change neighbouring rows
 _LOOPS: Final = 0.1  # share of those that follow a closed path
-_TRIES: Final = 100
 _NEIGHBOURS: Final = 5  # rows that change together, at most
 
 
 class Perturbations:
     """Changes of the jumps of rows between points; offsets are the turns of labels along the rows."""
 
-    def __init__(
-        self,
-        rings: Rings,
-        size: int,
-        first: Ints,
-        second: Ints,
-        is_allowed: Callable[[Ints, Ints], bool] = lambda rows, steps: True,  # noqa: ARG005
-    ) -> None:
-        """Prepare rows with these ends, (r,), and their rings; ends from `size` on are the ground.
-
-        is_allowed: whether rows may change by some steps.
-        """
-        self._rings, self._size, self._ends, self._is_allowed = rings, size, (first, second), is_allowed
+    def __init__(self, rings: Rings, size: int, first: Ints, second: Ints) -> None:
+        """Prepare rows with these ends, (r,), and their rings; ends from `size` on are the ground."""
+        self._rings, self._size, self._ends = rings, size, (first, second)
         # The ring that goes along a row from its first point to its second one [0], and back [1], or -1; and
         # the step of that ring.
         self._beside, self._step = np.full((2, len(first), 2), -1)
@@ -55,13 +43,7 @@ class Perturbations:
         self._start, self._at_point = by_point.indptr, by_point.indices
 
     def draw(self, rng: np.random.Generator, offsets: Floats) -> Change:
-        """A random change at the present turns of labels, (r,), that is allowed; none after 100 others."""
-        for _ in range(_TRIES):
-            if self._is_allowed(*(change := self._draw_any(rng, offsets))):
-                return change
-        return _change(Counter())
-
-    def _draw_any(self, rng: np.random.Generator, offsets: Floats) -> Change:
+        """A random change at the present turns of labels, (r,)."""
         kind = rng.random()
         if kind < _ROWS or not len(self._rings.defect):
             return self.change_neighbours(rng)

@@ -128,7 +128,7 @@ def search(
     InputError
         For a negative number of rounds, and for too few or too many jobs.
     InstanceError
-        For a start on another instance.
+        For a start on another instance, and where no field is found that has the prescribed indices.
 
     """
     asked = stop_function(stop)

@@ -114,7 +114,7 @@ def explore_from(
 def _lower_landscape(land: Land, change: Change, rng: np.random.Generator, is_over: IsOver) -> Land | None:
     """The landscape at the lowest point of a walk after a change; None if it finds no lower one."""
     with suppress(np.linalg.LinAlgError):
-        goal = below(land.to_beat)
+        goal = below(land.energy)
         land.change(*change)
         jumps = _walk(land, rng, goal, is_over)
         # Computed anew, because rounding of many updates must not accumulate.

@@ -129,6 +129,8 @@ def try_all_integers(instance, span=2):
     z[:, free] += steps
     offsets = energy.constant + np.pi / 2 * z
     totals = np.einsum("kr,rq,kq->k", offsets, form, offsets, optimize=True)
+    if energy.sums is not None:
+        totals[(energy.sums @ z.T != energy.turns_along[:, None]).any(axis=0)] = np.inf
     best = int(totals.argmin())
     assert not len(free) or (np.abs(steps[best]) < span).all()
     return float(totals[best]), z[best]

@@ -95,7 +95,8 @@ class RingDual:
 
     def pass_over(self, most: float, *, forward: bool) -> tuple[float, float]:
         """One pass: the bound, if no tables cost anything, and the share of labels that `most` leaves."""
-        self.bound, left = _pass_over(self.state, most - self.bound, forward)
+        bound, left = _pass_over(self.state, most - self.bound, forward)
+        self.bound = bound + self.level.rows.constant
         return self.bound, left / len(self.state.unary)
 
     def interpolate(self, old: RingDual) -> None:

@@ -57,6 +57,7 @@ PARTS = (
 OF_MESH = ("instance_vertices", "instance_faces", "instance_stroke_faces", "kappa")
 OF_GRID = ("instance_origin", "instance_mask", "instance_stroke_pixels")
 WEIGHTS = "instance_pair_weights"  # also, unless all are 1
+INDICES, POTENTIAL = "instance_indices", "potential"  # also, where indices are prescribed
 LOOPS = ("loop_start", "loop_row", "loop_sign", "stages")  # also, or none of them
 STAGE_PARTS = {  # of charges, with their kinds; the first four have a number for each loop
     "positive": "|u1", "negative": "|u1", "potential": "<f8", "price": "<f8",
@@ -82,6 +83,10 @@ class CentredRows:
     size of the numbers that make a residual of the centre. slack: by which the energies of all fields may be
     less than here, because kappa differs from that of the mesh. memory, taken: most bytes for the check, and
     those that it takes without levels.
+
+    Prescribed indices (Lemma 10) shift the offsets of some rows, held (r,), and add `constant` to the energy.
+    given (r,): offsets without that. steps (3, t): ring, row and direction along the rings of these indices.
+    turns (k,): the sums of integers there. loose (r,): for the rounding of the constant.
     """
 
     def __init__(
@@ -108,7 +113,9 @@ class CentredRows:
         self.size, self.pairs, self.first = n, m, np.concatenate([first, point])
         self.second = np.concatenate([second, np.full(len(point), n)])
         self.ends = list(zip(self.first.tolist(), self.second.tolist()))
-        self.offset, self.weight = np.concatenate([kappa, -theta]), np.concatenate([2 * weight, of_strokes])
+        self.given, self.weight = np.concatenate([kappa, -theta]), np.concatenate([2 * weight, of_strokes])
+        self.steps, self.turns = rings_of_indices(arrays, np.array([first, second]), kappa)
+        self._shift_offsets(arrays)
         self.rings, self.fixed = rings_of(arrays, first, second), self._fixed_points()
         self.limit = limits_of(self) if limit is None else limit
         self.slack = math.fsum(self.weight[:m] * (HALF + wrong) * wrong)  # |r| is at most pi/4
@@ -119,6 +126,30 @@ class CentredRows:
         base.require(self.half <= np.where(self.fixed, 0, 1), "half", "is not 0, or 1 at a point not fixed")
         self.nearest = np.round(-self.residuals(self.centre) / HALF)
         self.residual = self.residuals(self.centre) + HALF * self.nearest
+
+    def _shift_offsets(self, arrays: dict[str, Array]) -> None:
+        """Lemma 10, without the deduction of rounding that depends on the energy."""
+        (ring, row, sign), given, size = self.steps, self.given, len(self.turns)
+        self.held, self.offset, self.constant = np.bincount(row, minlength=len(given)) > 0, given, 0.0
+        if size == 0:
+            return
+        potential = base.take_array(arrays, POTENTIAL, "<f8", size)
+        weight = np.where(self.held, self.weight, 1.0)
+        shift = np.bincount(row, sign * potential[ring], len(given)) / weight
+        base.require(np.abs(shift) <= MOST_ANGLE, POTENTIAL, "shifts a residual too far")
+        self.offset, reach = given - shift, np.abs(given) + np.abs(shift)
+        rest = np.bincount(ring, (sign * self.offset[row]), size) + HALF * self.turns
+        constant = 2 * math.fsum(potential * rest) + math.fsum(weight * shift * shift)
+        margin = MARGIN + base.PRECISION * int(np.bincount(ring).max())
+        most = np.bincount(ring, reach[row], size) + HALF * np.abs(self.turns)
+        self.constant = constant - margin * math.fsum(np.abs(potential) * most)
+        self.loose = np.where(self.held, weight * (1 + np.abs(shift)) * (1 + reach), 0.0)
+
+    def deduct_rounding(self, threshold: float) -> None:
+        """Deduct from the constant what rounding costs fields with an energy of at most the threshold."""
+        if len(self.turns):
+            far = 1 + np.sqrt(threshold / np.where(self.held, self.weight, 1.0))  # limits residuals
+            self.constant -= MARGIN * math.fsum(self.loose * far)
 
     def residuals(self, angle: Array) -> Array:
         """Residuals of all rows at z = 0; angle (n + 1,), 0 at the ground."""
@@ -177,6 +208,67 @@ def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, A
     return n, *ends, kappa, point, wrong
 
 
+def rings_of_indices(arrays: dict[str, Array], pairs: Array, kappa: Array) -> tuple[Any, Array]:
+    """Steps (ring, pair, direction) along the rings of prescribed indices, and the sums of integers there.
+
+    pairs (2, m): their points.
+    """
+    if INDICES not in arrays:
+        return np.zeros((3, 0), np.int64), np.zeros(0)
+    vertex, wanted = base.take_array(arrays, INDICES, "<i4", None, 2).astype(np.int64).T
+    base.require(len(vertex) > 0 and np.diff(vertex, prepend=-1) > 0, INDICES, "are out of order")
+    steps_at = steps_on_mesh if "instance_faces" in arrays else steps_on_grid
+    ring, pair, sign, defect = steps_at(arrays, vertex, pairs)
+    flat = (defect - np.bincount(ring, sign * kappa[pair], len(vertex))) / HALF
+    base.require(np.abs(flat - np.round(flat)) < 0.1, INDICES, "do not fit the angles round a vertex")
+    return (ring, pair, sign), np.round(flat) - wanted
+
+
+def steps_on_mesh(arrays: dict[str, Array], vertex: Array, _: Array) -> tuple[Array, Array, Array, Array]:
+    """Steps counter-clockwise round vertices, and 2 pi less the angles there, (k,)."""
+    faces = arrays["instance_faces"].astype(np.int64)
+    at, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    inner = np.isin(at * (faces.max() + 1) + end, end * (faces.max() + 1) + at)
+    ends = np.stack([at, end])[:, inner & (at < end)]  # the second face of a pair is left of the way back
+    number = np.searchsorted(vertex, ends).clip(max=len(vertex) - 1)
+    high, pair = np.nonzero(vertex[number] == ends)
+    ring = number[high, pair]
+    side = np.roll(arrays["instance_vertices"][faces], -1, axis=1) - arrays["instance_vertices"][faces]
+    side /= np.abs(side).max(axis=(1, 2))[:, None, None]
+    back = -np.roll(side, 1, axis=1)
+    angle = np.arctan2(np.linalg.norm(np.cross(side, back), axis=2), (side * back).sum(axis=2)).ravel()
+    known, size = np.isin(at, vertex), len(vertex)
+    corner = np.searchsorted(vertex, at[known])
+    closed = np.bincount(corner, minlength=size) == np.bincount(ring, minlength=size)
+    base.require(closed & np.isin(vertex, at), INDICES, "names a vertex without a ring")
+    return ring, pair, 2 * high - 1, 2 * np.pi - np.bincount(corner, angle[known], size)
+
+
+def steps_on_grid(arrays: dict[str, Array], vertex: Array, pairs: Array) -> tuple[Array, Array, Array, Array]:
+    """Steps counter-clockwise round corners of pixels, numbered row by row, and zeros, (k,).
+
+    Where only two pixels meet in a corner, across, it has two numbers.
+    """
+    inside = np.pad(arrays["instance_mask"], 1)
+    corners = np.array([inside[:-1, :-1], inside[:-1, 1:], inside[1:, :-1], inside[1:, 1:]])
+    one, two, three, four = corners
+    across = (one & four & ~two & ~three) | (two & three & ~one & ~four)
+    count = (corners.any(axis=0).astype(np.int64) + across).ravel()
+    place = np.searchsorted(np.cumsum(count), vertex, side="right")
+    base.require(place < len(count), INDICES, "names a vertex without a ring")
+    row, column = np.divmod(place, inside.shape[1] - 1)
+    base.require(corners[:, row, column].all(axis=0), INDICES, "names a vertex without a ring")
+    number = np.full(inside.shape, -1)
+    number[inside] = np.arange(inside.sum())
+    upper, lower = number[row[:, None] + [[[0]], [[1]]], column[:, None] + [0, 1]]
+    (c, d), (a, b), size = upper.T, lower.T, inside.size
+    key, order = pairs[0] * size + pairs[1], np.argsort(pairs[0] * size + pairs[1])
+    wanted = np.concatenate([a * size + b, b * size + d, c * size + d, a * size + c])
+    pair = order[np.searchsorted(key[order], wanted)]
+    ring, sign = np.tile(np.arange(len(vertex)), 4), np.repeat([1, 1, -1, -1], len(vertex))
+    return ring, pair, sign, np.zeros(len(vertex))
+
+
 def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring]:
     """The rings: closed walks over different points and pairs. first, second (m,): the ends of pairs."""
     start = base.take_array(arrays, "ring_start", "<i4", None).astype(np.int64)
@@ -200,7 +292,7 @@ def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring
 
 
 def limits_of(rows: CentredRows) -> Array:
-    """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,).
+    """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,), pi/4 of rows that are held.
 
     Any potential gives a lower bound of a resistance. Here it is a difference of two columns of an inverse.
     """
@@ -224,6 +316,7 @@ def limits_of(rows: CentredRows) -> Array:
             drop = potential[ends[0]] - potential[ends[1]]
             power = np.maximum(weight @ (drop * drop), 1e-300)
             share[some] = weight[some] * drop[some, np.arange(len(some))] ** 2 / power
+    share[rows.held] = 0.0
     return QUARTER * np.clip(1 - share * (1 - RELATIVE), 0.0, 1.0) + RELATIVE
 
 
@@ -456,7 +549,7 @@ class Excess:
         self.by_point = np.split(self.points, pairs.start[1:-1])
         of_tables = [3 * np.abs(table).max() for _, tables in rings for table in tables]
         self.error = MARGIN * math.fsum([*size, *of_tables])
-        self.bound = math.fsum(least) - self.error
+        self.bound = math.fsum(least) - self.error + rows.constant
         base.require(math.isfinite(self.bound), "the level", "has no finite bound")
 
     def _along(self, ring: Ring, tables: list[Array], combine: Any) -> list[Array]:
@@ -516,6 +609,11 @@ def possible_turns(level: CellLevel, squares: Array) -> Array:
     return np.array([np.bincount(row[of_turn], minlength=len(rows.first)) > 0 for of_turn in possible]).T
 
 
+def forced_of(rows: CentredRows, turns: Array) -> Array:
+    """Whether each pair has one possible turn, 0, and its integer can change alone, (m,)."""
+    return (turns[: rows.pairs] == CENTRAL).all(axis=1) & ~rows.held[: rows.pairs]
+
+
 def cases_of(turns: Array) -> list[tuple[int, ...]]:
     """All choices of one turn for each row; none if there are too many."""
     if np.log2(np.maximum(turns.sum(axis=1), 1)).sum() > math.log2(MOST_CASES) + RELATIVE:
@@ -536,7 +634,7 @@ def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
         away = np.abs(angle - rows.centre) + np.where(rows.fixed, 0.0, np.pi)
         size = np.sum(rows.weight * (1 + r * r) * (1 + rows.reach_of(angle))) / 4 * (1 + away.max())
         bounds.append(math.fsum(rows.weight * r * r) - math.fsum(np.abs(slope) * away) - MARGIN * float(size))
-    return min(bounds)
+    return min(bounds) + rows.constant
 
 
 # Section 5: charges ----------------------------------------------------------------------------------------
@@ -671,7 +769,8 @@ def stage_of(charges: Charges, clouds: Clouds, potential: Array, price: Array) -
     size = (
         np.abs(price) @ (1 + np.abs(charges.origin)) + np.abs(potential) @ (2 + reach) + np.abs(added).sum()
     )
-    return HALF**2 * (least - (charges.margin + turn) * float(size)), HALF**2 * added, kind
+    bound = HALF**2 * (least - (charges.margin + turn) * float(size)) + charges.rows.constant
+    return bound, HALF**2 * added, kind
 
 
 def charges_bound(arrays: dict[str, Array], rows: CentredRows, threshold: float) -> float:
@@ -729,6 +828,7 @@ def check_arrays(
     rows = CentredRows(arrays, limit, memory)
     energy, error, same = energy_of(arrays, rows)
     threshold = base.number_in(head, "threshold", energy + error, math.inf)
+    rows.deduct_rounding(threshold)
     bounds, work, squares = list[float](), 0, np.zeros(0, bool)
     turns = np.ones((len(rows.first), len(TURNS)), bool)
     for number, count in enumerate(divisions):
@@ -756,7 +856,7 @@ def check_arrays(
     least = max(*bounds, cases_bound(rows, turns, angles), charges_bound(arrays, rows, threshold))
     proven = max(0.0, min(least, energy - error) - rows.slack)
     bound = max(0.0, proven - base.SPARE * (1 + proven))
-    status, forced = base.status_of(energy, bound), (turns[: rows.pairs] == CENTRAL).all(axis=1) & same
+    status, forced = base.status_of(energy, bound), forced_of(rows, turns) & same
     claim = base.Findings(status, 2, energy, bound, forced, bounds)
     base.check_claim(head, claim, proven, error)
     return claim
@@ -766,6 +866,7 @@ def check_names(arrays: dict[str, Array], levels: int) -> None:
     """Raise UnreadableError unless the arrays are exactly those of a certificate with so many levels."""
     of_domain = OF_MESH if "instance_faces" in arrays else OF_GRID
     more = {WEIGHTS} & arrays.keys()
+    more |= {INDICES, POTENTIAL} if INDICES in arrays else set()
     if "loop_start" in arrays:
         stages = range(stage_count(arrays))
         more |= {*LOOPS} | {f"stage_{number}_{part}" for number in stages for part in STAGE_PARTS}
@@ -790,8 +891,11 @@ def energy_of(arrays: dict[str, Array], rows: CentredRows) -> tuple[float, float
     base.require(inside, "alpha", "is outside its window")
     p = p.astype(np.int64)
     base.require(np.abs(p) <= base.MOST_JUMP, "p", "is no jump")
-    r = rows.residuals(np.append(alpha, 0.0))
+    r = rows.residuals(np.append(alpha, 0.0)) + (rows.given - rows.offset)
     r[:m] += HALF * p
+    (ring, row, sign), wrong = rows.steps, "has other sums along the rings of prescribed indices"
+    base.require(np.bincount(ring, sign * p[row], len(rows.turns)) == rows.turns, "p", wrong)
+    base.require(np.abs(r[rows.held]) <= QUARTER + FLAT, "alpha", "is too far from neighbours at an index")
     turns = np.round((rows.centre[:-1] - alpha) / HALF)
     same = p - turns[rows.first[:m]] + turns[rows.second[:m]] == rows.nearest[:m]
     return math.fsum(rows.weight * r * r), MARGIN * float(np.sum(rows.weight * (1 + r * r))), same

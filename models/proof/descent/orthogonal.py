@@ -19,10 +19,12 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ...array_archive import Arrays
 from ...field.field import CrossField
+from ...instance.angles import HALF
 from ...instance.cycles import grow_forest
 from ...instance.domain import Bools, Domain, Floats, Ints
 from ...instance.file import instance_arrays
 from ...instance.instance import Instance
+from ...instance.sparse_systems import factor_matrix
 from ...orthogonal.energy import OrthogonalEnergy, field_of
 from ...processes.deadline import Progress, never
 from ...search.integer_fields import starting_integers
@@ -57,6 +59,10 @@ _LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one, and
 _STARTS: Final = 0.3  # of the time, after which no start is rounded with care
 _CHARGES: Final = 0.5  # of the time, which charges leave
 _LOOK: Final = 1e-4  # seconds per point of a first look at charges, and of its check, where points are many
+_PULL: Final = 1e-9  # relative: makes the matrix of prescribed rings of a closed part definite
+_TUNING: Final = 0.1  # of the time, in which the multipliers of prescribed sums rise
+_STEPS: Final = 8  # of these
+_SOFT: Final = 0.1  # of the gap: excess of labels that count less, and what sums lack that needs no step
 _WIDE: Final = 0.01  # relative gap after which a search follows, from the second spacing on
 _SEARCH: Final = 0.25  # share of the time left that it takes at most
 _ROUNDS: Final = 10  # of a search without a limit of time
@@ -146,12 +152,48 @@ class _Prover:
         self.arrays |= {"ring_start": rings.start, "ring_pair": rings.pair}
         self.arrays |= {"ring_sign": rings.sign.astype(np.int8), "centre": np.zeros(domain.size)}
         self.arrays["half"] = np.zeros(domain.size, np.uint8)
+        if (sums := self.energy.sums) is not None:  # multipliers as if all other sums were free
+            around = sums @ self.energy.constant + HALF * self.energy.turns_along
+            matrix = (sums / self.energy.weight) @ sums.T
+            self.arrays[checker.POTENTIAL] = factor_matrix(matrix, pull=_PULL * matrix.max())(around)
         rows, links = checker.CentredRows(self.arrays), self.energy.links
         self.order = reverse_cuthill_mckee(links + links.T, symmetric_mode=True).astype(np.int64)
         if fits:  # otherwise no level follows, and this takes long
             self.arrays["half"] = two_colours(domain, rows.fixed[:-1])
         self.limit = rows.limit
+        if fits and self.energy.sums is not None:
+            self._raise_potential()
         return rows
+
+    def _raise_potential(self) -> None:
+        """Raise the bound of the coarsest level by steps of the multipliers of prescribed sums (Polyak 1969).
+
+        The slope is what integers lack of the sums, in the mean over labels, those of least excess first.
+        """
+        soon, given = self.ends.deadline.share(_TUNING), self.arrays[checker.POTENTIAL]
+        best, step = -math.inf, np.zeros_like(given)
+        for _ in range(_STEPS):
+            arrays = self.arrays | {checker.POTENTIAL: given + step}
+            chain, rows = self._begin_chain(arrays)
+            level = checker.first_level(rows, _COARSEST)
+            costs, most, pairs = checker.costs_of(level), chain.threshold, level.pairs
+            dual = RingDual(level, costs, self.order, [])
+            for number in range(2 * _PASSES):
+                dual.pass_over(most, forward=number % 2 == 0)
+            excess = checker.Excess(level, costs, 1.0, dual.state.shares[: pairs.first_line[rows.pairs]], [])
+            if excess.bound <= best:
+                step /= 2
+                continue
+            best, given, self.arrays = excess.bound, given + step, arrays
+            first, second = pairs.at_ends(level.label + rows.half[level.point] / 2)
+            residual = rows.residual[pairs.row] + HALF / level.divisions * (first - second)
+            spare = np.add(*pairs.at_ends(excess.points)) + excess.pairs
+            share = np.exp(-spare / (_SOFT * max(most - best, 1e-9 * (1 + most))))
+            turns = np.bincount(pairs.row, -np.round(residual / HALF) * share) / np.bincount(pairs.row, share)
+            lacking = self.energy.turns_along - self.energy.sums @ (rows.nearest + turns)
+            if lacking @ lacking < _SOFT or soon.passed() or self.ends.is_over():
+                break
+            step = (most - best) / np.pi * lacking / max(lacking @ lacking, 1.0)
 
     def _bound_by_charges(self) -> str:
         """Bound the energy by charges where a part has no stroke; the reason why no level follows.
@@ -213,6 +255,8 @@ class _Prover:
         Where no level helps, fits or has time, the rest of the time goes to the search.
         """
         try:
+            if self.least == math.inf:  # no start keeps within the limits of prescribed indices
+                self._search(_SEARCH * self.ends.deadline.left())
             while True:
                 if reason := self._bound_by_charges():
                     return reason
@@ -279,13 +323,14 @@ class _Prover:
             rings = rings + more
             level, before = checker.next_level(level, squares, factor), dual
 
-    def _begin_chain(self) -> tuple[_TimedChain, CentredRows]:
-        """A chain round the best field, without levels, and its rows."""
+    def _begin_chain(self, shared: Arrays | None = None) -> tuple[_TimedChain, CentredRows]:
+        """A chain round the best field, without levels, and its rows. shared: by default `arrays`."""
         best = field_of(self.instance, self.z, self.energy)
-        arrays = self.arrays | self.of_charges | {"centre": self.energy.fit_angles(self.z)}
+        arrays = (shared or self.arrays) | self.of_charges | {"centre": self.energy.fit_angles(self.z)}
         arrays["divisions"] = np.zeros(0, np.int32)
         arrays["cases"] = np.zeros((0, self.instance.domain.size))
         rows = checker.CentredRows(arrays, self.limit)
+        rows.deduct_rounding(self.least)
         energy, error, _ = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
         most = energy * (1 + _BETTER) + 2 * error
         return _TimedChain(arrays=arrays, threshold=most, convex=self.charges), rows
@@ -361,6 +406,8 @@ class _Prover:
 
     def _offer(self, z: Ints) -> bool:
         """Whether integers are better than the best ones, which they then are."""
+        if not self.energy.has_sums(z):
+            return False
         total = self.energy.least_total(z)
         if better := bool(total < self.least * (1 - _BETTER) - 1e-12):
             self.z, self.least = z, total
@@ -382,7 +429,7 @@ class _Prover:
         chain.arrays["divisions"] = np.append(chain.arrays["divisions"], np.int32(level.divisions))
         chain.levels.append(LevelFacts(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
         turns = checker.possible_turns(level, squares)
-        chain.forced = int((turns[: rows.pairs] == checker.CENTRAL).all(axis=1).sum())
+        chain.forced = int(checker.forced_of(rows, turns).sum())
         cases = [(rows.nearest + np.array(case)).astype(np.int32) for case in checker.cases_of(turns)]
         angles = np.array([self.energy.fit_angles(z) for z in cases]).reshape(-1, rows.size)
         chain.arrays["cases"] = angles

@@ -115,9 +115,10 @@ def test_singularities_of_a_file_are_prescribed_in_models_and_kept_by_answers(tm
     cf.write_field(cf.solve(problem, "highs").field, "solved.rawfield")
     limit = ["--time-limit", "1", "-o"]
     assert invoke(["solve", "part.json", "-m", "search", *limit, "searched"]) == 0
+    assert invoke(["prove", "part.json", *limit, "proven"]) == 0
     for number, path in enumerate(Path().glob("*/*.field.npz")):
         cf.write_field(cf.read_field(path), f"{number}.rawfield")
-    for path in ("solved", "0"):
+    for path in ("solved", "0", "1"):
         written = Path(f"{path}.sings").read_text().splitlines()
         assert {*rows[1:]} <= {*written[1:]}
         assert not any(row.startswith(f"{corners[0]} ") for row in written[1:])

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
+from dataclasses import replace
 
 import crossfield as cf
 import numpy as np
@@ -56,6 +58,25 @@ def test_no_bound_exceeds_the_optimum_of_all_integers(seed, grid):
         proof = prove_from(instance, worse, levels=3)
         assert proof.bound <= optimum + 1e-9
         assert proof.status == "gap" or proof.energy <= optimum + 1e-7
+
+
+@pytest.mark.parametrize("seed, grid", [(0, False), (2, False), (0, True), (1, True)])
+def test_no_bound_exceeds_the_optimum_with_given_indices(seed, grid):
+    instance = random_instance(seed, grid=grid)
+    vertices, closed = instance.domain.ring_vertices[:2], 0
+    for turns in itertools.product((-1, 0, 1), repeat=len(vertices)):
+        try:
+            part = replace(instance, indices=np.stack([vertices, turns], axis=1))
+        except cf.InstanceError:  # residuals of at most pi/4 do not reach it
+            continue
+        optimum, z = try_all_integers(part)
+        proof = cf.prove(part, work=20_000)
+        assert proof.bound <= optimum + 1e-9 <= proof.energy + 2e-9
+        proof.field.check_instance(part)
+        closed += proof.status == "optimal"
+        if len(part.theta) and OrthogonalEnergy.of(part).least_total(z) < np.inf:
+            assert keeps_optimum(part, z, prove_from(part, z, levels=3))
+    assert closed
 
 
 def bound_of_charges(arrays):
@@ -166,14 +187,15 @@ def test_levels_end_while_there_is_time_for_their_check(monkeypatch):
     assert 0 < len(seconds) <= 6
 
 
-@pytest.fixture(scope="module")
-def forgeable():
+@pytest.fixture(scope="module", params=[None, [(0, 1)]])
+def forgeable(request):
     """Certificates of a best field, with rings, and of a worse one, each with the optimum."""
-    instance = fan(8)
+    instance = replace(fan(8), indices=request.param)
     proof = cf.prove(instance)
     z = integers_of(proof.field)
     for pair in range(8):
         z[pair] += 1
+        z = OrthogonalEnergy.of(instance).with_sums(z)
         worse = prove_from(instance, z, levels=2)
         if worse.energy > proof.energy + 1e-3:
             return proof.energy, [proof.certificate(), worse.certificate()]

@@ -2,6 +2,7 @@
 
 import itertools
 import re
+from dataclasses import replace
 
 import crossfield as cf
 import numpy as np
@@ -12,7 +13,7 @@ from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError
 from meshes import torus
 from orthogonal_certificates import certificate_at, shares_of_star, star
-from small_meshes import fan, strokeless, try_all_integers
+from small_meshes import fan, random_instance, strokeless, try_all_integers
 
 HALF = np.pi / 2
 BOTH = ([1, 1], [1, -1])  # one pair, there and back
@@ -198,6 +199,25 @@ def test_each_broken_assumption_is_refused_by_name(subtests):
     for number, (message, change) in enumerate(BROKEN):
         with subtests.test(message, number=number):
             assert message in refusal(change(sound))
+
+
+@pytest.mark.parametrize("instance", [fan(8), random_instance(0, grid=True)])
+def test_indices_that_the_field_or_the_vertices_have_not_are_refused(instance):
+    vertex = instance.domain.ring_vertices[0]
+    sound = cf.prove(replace(instance, indices=[(vertex, 1)]), work=20_000).certificate()
+    rows = checker.CentredRows(sound)
+    assert (rows.limit[rows.held] >= np.pi / 4).all()  # not Lemma 1: these integers cannot change alone
+    for message, forged in (
+        ("other sums", {"instance_indices": [[vertex, 0]]}),
+        ("without a ring", {"instance_indices": [[1, 1]]}),
+        ("without a ring", {"instance_indices": [[10**6, 1]]}),
+        ("out of order", {"instance_indices": [[vertex, 1], [vertex, 1]]}),
+        ("too far", {"potential": [1e9]}),
+    ):
+        arrays = {name: np.array(array, sound[name].dtype) for name, array in forged.items()}
+        assert message in refusal(sound | arrays)
+    assert "has no array potential" in refusal({n: a for n, a in sound.items() if n != "potential"})
+    assert "too many" in refusal({n: a for n, a in sound.items() if n != "instance_indices"})
 
 
 def of_sole_loop(rows, signs):
