@@ -166,14 +166,13 @@ def test_a_picture_lies_under_its_traced_strokes(empty, tmp_path):
     assert find(settled(browser), "#opacity").is_displayed()
 
 
-SHOWN = """
+SHOWN = """// keeps the picture that is painted last on the surface canvas, and its place
 const draw = CanvasRenderingContext2D.prototype.drawImage;
 CanvasRenderingContext2D.prototype.drawImage = function(image, ...box) {
   if (this.canvas.id === "surface" && box.length === 4) window.shown = [image.toDataURL(), box];
   return draw.call(this, image, ...box);
 };
 """
-"""Keeps the picture that is painted last on the surface canvas, and its place."""
 
 
 @pytest.mark.parametrize("content", [sample_svg("bottle").encode(), PEBBLE])
@@ -208,12 +207,11 @@ def test_the_preview_is_the_picture_that_shade_writes(empty, tmp_path, content):
     assert off[opaque].max() <= 1
 
 
-DRAWN = """
+DRAWN = """// counts the parts of strokes that are painted
 const line = Path2D.prototype.lineTo;
 window.drawn = 0;
 Path2D.prototype.lineTo = function (...to) { window.drawn += 1; return line.apply(this, to); };
 """
-"""Counts the parts of strokes that are painted."""
 
 
 def test_a_stroke_more_paints_none_of_the_others_again(empty, tmp_path):
@@ -348,28 +346,27 @@ def test_shift_draws_straight_and_an_axis_mirrors_strokes(empty):
 
 
 def test_the_view_is_moved_by_the_space_bar_and_zoomed_by_buttons_and_keys(empty):
-    def line():
+    def place(change=lambda: None):
+        """Left, top and right of a line at the same place of the screen."""
+        change()
         tool(empty, "draw")
-        return document(drag(empty, [(100, 200), (200, 200)]))["strokes"][-1]["points"]
+        return document(drag(empty, [(100, 200), (200, 200)]))["strokes"][-1]["points"][:3]
 
-    def space(kind):
-        empty.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": kind, "key": " ", "code": "Space"})
+    def pan():
+        space = {"key": " ", "code": "Space"}
+        empty.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": "keyDown", **space})
+        drag(empty, [(100, 200), (150, 230)])
+        empty.execute_cdp_cmd("Input.dispatchKeyEvent", {"type": "keyUp", **space})
 
-    first = line()
-    space("keyDown")
-    drag(empty, [(100, 200), (150, 230)])
-    space("keyUp")
-    assert len(document(empty)["strokes"]) == 1
-    moved = line()
-    assert [b - a for a, b in zip(first, moved, strict=True)] == pytest.approx(
-        [(first[0] - first[2]) / 2, (first[0] - first[2]) * 0.3] * 2, abs=0.01
-    )
-    find(empty, "#left [aria-label='Zoom in']").click()
-    assert line()[2] - line()[0] == pytest.approx((first[2] - first[0]) / 1.25, abs=0.01)
-    find(empty, "#left [data-zoom='0']").click()
-    assert line() == first
-    press(empty, "-", control=True)
-    assert line()[2] - line()[0] == pytest.approx((first[2] - first[0]) / 0.8, abs=0.01)
+    left, top, right = place()
+    wide = right - left
+    assert place(pan) == pytest.approx([left - wide / 2, top - 0.3 * wide, right - wide / 2], abs=0.01)
+    zoomed = place(find(empty, "#left [aria-label='Zoom in']").click)
+    assert zoomed[2] - zoomed[0] == pytest.approx(wide / 1.25, abs=0.01)
+    assert place(find(empty, "#left [data-zoom='0']").click) == [left, top, right]
+    zoomed = place(lambda: press(empty, "-", control=True))
+    assert zoomed[2] - zoomed[0] == pytest.approx(wide / 0.8, abs=0.01)
+    assert len(document(empty)["strokes"]) == 5
 
 
 def test_coordinates_of_a_message_mark_their_place(empty, tmp_path):
