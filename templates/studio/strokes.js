@@ -98,7 +98,7 @@ export function fitShift(strokes, [x, y, wide, high], shift) {
 
 /** Points x, y, x, y, ... on the other side of an axis x, y, x, y. */
 export function reflected(points, [ax, ay, bx, by]) {
-  const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy;
+  const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy || 1;
   return points.map((value, k) => {
     const even = k - k % 2, away = 2 * ((points[even] - ax) * dy - (points[even + 1] - ay) * dx) / long;
     return rounded(k % 2 ? value + away * dx : value - away * dy);

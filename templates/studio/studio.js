@@ -42,6 +42,7 @@ function banner(text, { kind = "error", retry = false } = {}) {
 }
 /** A text as nodes: coordinates are buttons that mark their place on both pictures. */
 function placed(text) {
+  state.spot = null; // the button that showed it may be gone
   const number = "-?[\\d.]+(?:e[+-]?\\d+)?", show = spot => () => { state.spot = spot; refresh(false); };
   return text.split(new RegExp(`(\\(${number}, ${number}\\))`)).map((part, k) => {
     if (k % 2 === 0) return part;
@@ -347,8 +348,8 @@ function finish(live) {
   else if (tool === "area") editMask({ kind: "toggle", points: first, radius: 0 });
   else if (tool === "turn") turn({ path }, true);
   else if (tool === "mirror") {
-    const [x, y] = first, isHit = axis && withReflection(first, axis, reach).length === 1;
-    commit({ axis: hasLeft(live) ? [x, y, ...path.slice(-2)] : isHit ? undefined : [x, y, x, rounded(y + 1)] }); choose("draw");
+    const [x, y] = first, [ex, ey] = path.slice(-2), isHit = axis && withReflection(first, axis, reach).length === 1;
+    commit({ axis: Math.hypot(ex - x, ey - y) * left.scale > STILL ? [x, y, ex, ey] : isHit ? undefined : [x, y, x, rounded(y + 1)] }); choose("draw");
   }
 }
 const editMask = (...edits) => commit(doc => ({ ...doc, mask: [...doc.mask, ...edits] }));
@@ -525,6 +526,7 @@ async function begin() {
   const given = await read("first", "First drawing"), first = documentOf(given ?? { document: { page: canvasPage() } });
   state.history.reset(mine || first, { saved: !mine || saved === "yes" });
   if (mine) try { state.history.unpack(sessionStorage.getItem(`${KEPT}-past`), PARTS); } catch { /* without its past */ }
+  sessionStorage.removeItem(`${KEPT}-past`); // its room is for the drawing
   show(state.history.now);
   if (mine && given && !same && !confirm("This tab has a drawing from an earlier page. Keep it instead of the new one? If not, undo brings it back.")) replace(first);
   else if (mine) keep();
