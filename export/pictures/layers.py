@@ -62,20 +62,14 @@ def strokes_sheet(
     Renderers compute in single precision, too coarse for a page far away. width: of lines in pixels of the
     grid.
     """
+    x, y, wide, high = page
     frame, unit = _frame_and_unit(instance)
     if drawing is None:
-        layer = Layer("strokes", _stroke_lines(frame, unit))
+        moved = replace(frame, corner=(frame.corner[0] - x, frame.corner[1] - y))
+        layer = Layer("strokes", _stroke_lines(moved, unit))
     else:
-        layer = _drawing_layer(drawing, unit, width and width * instance.pixel_size)
-    x, y, wide, high = page
-    parts = tuple(
-        replace(mark, lines=[piece - (x, y) for piece in mark.lines])
-        if isinstance(mark, Lines)
-        else ImageMark((mark.box[0] - x, mark.box[1] - y, *mark.box[2:]), mark.colours)
-        for mark in layer.parts
-        if isinstance(mark, Lines | ImageMark)
-    )
-    return Sheet((0.0, 0.0, wide, high), (replace(layer, parts=parts),))
+        layer = _drawing_layer(drawing, unit, width and width * instance.pixel_size, (x, y))
+    return Sheet((0.0, 0.0, wide, high), (layer,))
 
 
 def page_of(instance: Instance) -> Box:
@@ -96,15 +90,21 @@ def _frame_and_unit(instance: Instance) -> tuple[GridFrame, float]:
     return frame, float(instance.pixel_size * max(instance.mask.shape) / UNITS)
 
 
-def _drawing_layer(drawing: Underlay, unit: float, width: float | None = None) -> Layer:
+def _drawing_layer(
+    drawing: Underlay, unit: float, width: float | None = None, origin: tuple[float, float] = (0.0, 0.0)
+) -> Layer:
     """The ink of a drawing, or its curves with a line width; by default many over each other are thinner."""
     if drawing.ink is not None:
         high, wide = (drawing.scale * side for side in drawing.ink.shape[:2])
-        return Layer("drawing", (ImageMark((0.0, 0.0, wide, high), drawing.ink),))
+        return Layer("drawing", (ImageMark((-origin[0], -origin[1], wide, high), drawing.ink),))
     every = [piece for curves in drawing.curves.values() for piece in curves]
     length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
     width = width or _BELOW * unit / np.sqrt(max(length / (_MUCH * UNITS * unit), 1.0))
-    lines = (Lines(INK[name], width, curves) for name, curves in drawing.curves.items() if curves)
+    lines = (
+        Lines(INK[name], width, [curve - origin for curve in curves])
+        for name, curves in drawing.curves.items()
+        if curves
+    )
     return Layer("drawing", tuple(lines))
 
 

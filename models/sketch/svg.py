@@ -37,7 +37,7 @@ from .colour import PAPER, is_red
 from .cover import Box
 from .curves import STRAIGHT, Curves, lines_as_cubics, run_numbers
 from .labels import LabelMatcher, colour_label, labels_of
-from .path_data import SHAPES, shape_curves, too_many_curves
+from .path_data import SHAPES, path_data, shape_curves, too_many_curves
 from .svg_effort import choose_side
 from .svg_elements import (
     GROUP,
@@ -54,7 +54,6 @@ from .svg_page import (
     GREATEST,
     UNPAGED,
     DrawingPage,
-    bring_near,
     fit_view,
     frame_drawing,
     page_of,
@@ -141,10 +140,10 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
         reason = "; ".join([*unread, *causes]) or "it has no visible path, line or shape; export it again"
         raise NoStrokeError(f"draws no stroke: {reason}")
     window = page.window if page else window_around(painted)
-    side, framing = choose_side(root, window, painted), (page, window)
+    side = choose_side(root, window, painted)
+    framed = frame_drawing(root, page, window, side)
     if max(walk.reach, *map(abs, window[:2])) > _FAR * max(window[2:]):
-        framing = bring_near(root, walk.places, page, window)
-    framed = frame_drawing(root, *framing, side)
+        framed = frame_drawing(_flatten(painted, walk.inherited, window), None, (0.0, 0.0, *window[2:]), side)
     if pens:
         _paint_strokes(painted, _plain_colours(root, walk.styles, painted), pens, page, matcher)
         curves = _trace_strokes(framed, page, window, unread, has_choice=matcher is not None)
@@ -155,6 +154,23 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
         if values is not None:
             values.setflags(write=False)
     return curves
+
+
+def _flatten(
+    shapes: Sequence[PaintedShape], styles: Mapping[Element, Mapping[str, str]], window: Box
+) -> Element:
+    """The shapes alone, without clips and masks, from the origin of a window on.
+
+    Renderers compute in single precision, which is too coarse far away.
+    """
+    root = Element(SVG + "svg")
+    for shape in shapes:
+        data = path_data((shape.points - window[:2]) / shape.scale)
+        style = ";".join(f"{key}:{value}" for key, value in styles[shape.element].items())
+        shape.element.tag = SVG + "path"
+        shape.element.attrib = {"d": data, "transform": f"scale({shape.scale!r})", "style": style}
+        root.append(shape.element)
+    return root
 
 
 def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page: DrawingPage | None) -> None:
@@ -460,8 +476,7 @@ class _ElementWalk:
 
     styles: of every element, without what it inherits. faults: of shapes, with their names. unused: an
     element and its transform, for each that is not understood. finest: least width that is seen. reach: the
-    greatest coordinate in units of the page. places: the matrix to the page of each element, and the points
-    of a shape.
+    greatest coordinate in units of the page. inherited: the styles of shapes with what they inherit.
     """
 
     styles: dict[Element, dict[str, str]]
@@ -475,7 +490,7 @@ class _ElementWalk:
     curves: int = 0
     finest: float = 0.0
     reach: float = 0.0
-    places: dict[Element, tuple[Any, Floats]] = field(default_factory=dict)
+    inherited: dict[Element, dict[str, str]] = field(default_factory=dict)
 
     def shapes(self, root: Element, page: DrawingPage | None) -> Iterator[PaintedShape]:
         """Every painted shape in drawing order. Replaces each `use` by a group of what it shows."""
@@ -487,7 +502,6 @@ class _ElementWalk:
         stack = [_Place(root, _START, Matrix.scale(box[2] / view[2], box[3] / view[3]), view[2:])]
         while stack:
             place = self._apply_style(stack.pop())
-            self.places[place.element] = place.matrix, np.empty((0, 4, 2))
             tag, element = tag_of(place.element), place.element
             self.visited += 1
             if self.visited > MAX_ELEMENTS:
@@ -507,7 +521,6 @@ class _ElementWalk:
                 continue
             elif tag == "svg" and element is not root:
                 place = _inner_view(place)
-                self.places[element] = place.matrix, np.empty((0, 4, 2))
             inner = replace(place, depth=place.depth + 1)
             stack += [replace(inner, element=child) for child in reversed(element)]
 
@@ -569,6 +582,7 @@ class _ElementWalk:
         if stroke and width < self.finest:
             self.faults.append(f"{name_of(place.element)}: its stroke is too thin to be seen")
             return
+        self.inherited[place.element] = {key: style[key] for key in _INHERITED if key in style}
         yield PaintedShape(
             place.element,
             name_of(place.element),
@@ -595,7 +609,6 @@ class _ElementWalk:
             if fault:
                 self.faults.append(f"{name_of(place.element)}: {fault}")
         points, m = self.outlines[key], place.matrix
-        self.places[place.element] = m, points
         self.curves += len(points)
         if self.curves > MAX_CURVES:
             raise too_many_curves()

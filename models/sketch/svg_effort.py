@@ -36,7 +36,7 @@ def choose_side(root: Element, window: Box, shapes: Sequence[PaintedShape]) -> i
     stack, around = [(root, False)], set[Element]()
     while stack:
         element, is_left = stack.pop()
-        inner = [*element, *drawn_references(element, named)]
+        inner = [*element, *_drawn_references(element, named)]
         if is_left:
             around.discard(element)
             known = [efforts[part] for part in inner if part in efforts]
@@ -84,7 +84,7 @@ def _is_layered(element: Element) -> bool:
     return any(name in style or name in element.attrib for name in _LAYERED)
 
 
-def drawn_references(element: Element, named: Mapping[str, Element]) -> Iterator[Element]:
+def _drawn_references(element: Element, named: Mapping[str, Element]) -> Iterator[Element]:
     """The clips, masks, patterns and copies that an element draws."""
     texts = [element.get(key, "") for key in ("style", "clip-path", "mask", "fill", "stroke")]
     if tag_of(element) == "use":

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Final
 from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from ..errors import InputError
 from ..input_limits import LEAST_LENGTH
-from ..instance.domain import Floats
 from .cover import Box
-from .path_data import path_data, shape_curves
-from .svg_effort import drawn_references
-from .svg_elements import GROUP, SVG, chosen_attributes, length_of_attribute, name_of, tag_of
+from .svg_elements import GROUP, SVG, chosen_attributes, length_of_attribute, name_of
 from .visible import PaintedShape
 
 GREATEST: Final = 1e9
@@ -79,44 +76,6 @@ def frame_drawing(root: Element, page: DrawingPage | None, window: Box, side: in
     )
     SubElement(inner, SVG + "g", chosen_attributes(root, GROUP)).extend(list(root))
     return frame
-
-
-def bring_near(
-    root: Element, places: Mapping[Element, tuple[Any, Floats]], page: DrawingPage | None, window: Box
-) -> tuple[DrawingPage | None, Box]:
-    """Move the origin of all coordinates to that of the window, as renderers compute in single precision.
-
-    places: of each drawn element, its matrix to the page and the points (k, 4, 2) of a shape. Returns the
-    page and the window as moved.
-    """
-    from svgelements import Matrix
-
-    named = {element.get("id", ""): element for element in root.iter()}
-    parents = {child: parent for parent in root.iter() for child in parent}
-    stack, moved = [(element, *place) for element, place in places.items()], set[Element]()
-    while stack:
-        element, matrix, points = stack.pop()
-        step = Matrix(element.get("transform", ""))
-        if tag_of(element) == "svg" and element is not root:
-            element.tag, step = SVG + "g", matrix * ~places[parents[element]][0]
-        element.set("transform", f"matrix({step.a!r} {step.b!r} {step.c!r} {step.d!r} 0 0)")
-        if len(points):
-            element.tag = SVG + "path"
-            element.set("d", path_data(points - (~matrix).point_in_matrix_space(window[:2])))
-        for target in drawn_references(element, named):
-            if target not in moved and tag_of(target) in ("clipPath", "mask"):
-                moved.add(target)
-                target.attrib = chosen_attributes(target, GROUP)
-                for child in target:
-                    inner = Matrix(child.get("transform", "")) * matrix
-                    stack.append((child, inner, shape_curves(tag_of(child), child.attrib, window[2:])[0]))
-    left, top, wide, high = window
-    near = (0.0, 0.0, wide, high)
-    if page is None:
-        return None, near
-    (x, y, *sides), box = page.view, page.box
-    view = (x - left * sides[0] / box[2], y - top * sides[1] / box[3], sides[0], sides[1])
-    return DrawingPage(view, (box[0] - left, box[1] - top, box[2], box[3]), near), near
 
 
 def fit_view(view: Box, wide: float, high: float, rule: str) -> tuple[float, float, float, float]:
