@@ -30,7 +30,7 @@ from ..instance.mesh import Mesh
 from ..storage import read_bytes
 from ..text_rows import Lines, filled_lines, number_rows, plain_text
 from .field import CrossField
-from .triangles import field_of_vectors, mesh_of, singular_vertices, triangle_counts, vectors_of
+from .triangles import field_of_vectors, mesh_of, triangle_counts, vectors_of
 
 _COMPONENTS: Final = ("ux", "uy", "uz", "vx", "vy", "vz")
 _VTK_TRIANGLE: Final = "5\n"  # type of a cell
@@ -59,7 +59,7 @@ def to_obj(instance: Instance) -> bytes:
 
 def to_sings(field: CrossField) -> bytes:
     """The text of the singularities: a line `4 k`, then vertex, from 0 as in the .obj, and 4 index."""
-    vertex, index = singular_vertices(field)
+    vertex, index = field.singularities.vertex, field.singularities.index
     quarters = np.round(4 * index).astype(np.int64)
     return f"4 {len(vertex)}\n{_text_of_rows(np.stack([vertex, quarters], axis=1))}".encode()
 
@@ -90,9 +90,8 @@ def _to_ply(field: CrossField) -> bytes:
 def _to_vtk(field: CrossField) -> bytes:
     """The text of the .vtk of a field."""
     mesh, vectors = mesh_of(field.instance), vectors_of(field)
-    vertex, turns = singular_vertices(field)
     index = np.zeros((len(mesh.vertices), 1))
-    index[vertex, 0] = turns
+    index[field.singularities.vertex, 0] = field.singularities.index
     u, v = (f"VECTORS {name} double\n{_text_of_rows(vectors[:, k])}" for k, name in enumerate("uv"))
     return (
         f"# vtk DataFile Version 3.0\ncrosses on {field.instance.name}\nASCII\n"

@@ -63,8 +63,8 @@ class Singularities:
 
     @property
     def vertex(self) -> Ints:
-        """Vertex inside each ring of a mesh, (k,)."""
-        return self.instance.mesh.ring_vertices[self.ring]
+        """Vertex inside each ring, as `mesh_of` numbers them, ascending, (k,)."""
+        return self.instance.domain.ring_vertices[self.ring]
 
     @property
     def _corner(self) -> Ints:

@@ -12,7 +12,7 @@ from typing import Final
 import numpy as np
 
 from ..instance.angles import arctangent, double_angle, line_difference, line_of
-from ..instance.domain import Floats, Ints
+from ..instance.domain import Floats
 from ..instance.instance import Instance
 from ..instance.mesh import Mesh
 from .field import CrossField
@@ -41,12 +41,6 @@ def vectors_of(field: CrossField) -> Floats:
     vectors = np.zeros((domain.size, 2, 3))
     vectors[:, :, :2] = np.stack([field.u, field.v], axis=1)
     return np.repeat(vectors, 2, axis=0) + 0.0
-
-
-def singular_vertices(field: CrossField) -> tuple[Ints, Floats]:
-    """Vertices of `mesh_of` around which the crosses turn, ascending, and their indices in turns."""
-    singularities = field.singularities
-    return field.instance.domain.ring_vertices[singularities.ring], singularities.index
 
 
 def field_of_vectors(instance: Instance, u: Floats, v: Floats) -> CrossField:

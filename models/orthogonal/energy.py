@@ -30,6 +30,7 @@ from ..instance.least_squares import RightAngles
 from ..instance.mesh import Mesh
 from ..processes.deadline import IsOver, never
 
+_MOST_LIMITS: Final = 1000  # residuals that are held at their limits
 MOST_DENSE: Final = 6000
 """Points up to which the inverse of the matrix is kept: 288 MB."""
 
@@ -76,10 +77,6 @@ class OrthogonalEnergy(RightAngles):
         """Whether steps (c,) of the integers of rows, each at most once, keep all prescribed sums."""
         return not self.held[rows].any() or not (self.sums[:, rows] @ steps).any()
 
-    def has_sums(self, z: Ints) -> bool:
-        """Whether integers have the prescribed sums."""
-        return self.sums is None or bool((self.sums @ z == self.turns_along).all())
-
     def with_sums(self, z: Ints) -> Ints:
         """The integers with the prescribed sums; what a ring lacks goes the shortest way to a free ring."""
         if self.sums is None:
@@ -124,22 +121,24 @@ class OrthogonalEnergy(RightAngles):
         return np.asarray(-self.solve_system(self.force(self.weight, z)))
 
     def fit_in_limits(self, z: Ints) -> Floats | None:
-        """As `fit_angles`, within residuals of pi/4 where indices are prescribed; None if none are.
+        """As `fit_angles`, with residuals of held rows and strokes of at most pi/4 if indices are prescribed.
 
-        An active-set method: the multipliers of all limits that were exceeded so far are a least-squares
-        problem without negative numbers (Lawson and Hanson 1974).
+        None if there are no such angles, or if more than 1,000 residuals are at their limits. An active-set
+        method: the multipliers of all limits that were exceeded so far are a least-squares problem without
+        negative numbers (Lawson and Hanson 1974).
         """
         free, sides = self.fit_angles(z), np.zeros(len(z))
-        alpha = free
+        alpha, limited = free, self.held | (self.second == self.size)
         while self.sums is not None:
             residual = self.residuals(alpha, z)
-            beyond = np.where(np.abs(residual) > QUARTER + SLACK, np.sign(residual), 0.0)
+            beyond = np.where(limited & (np.abs(residual) > QUARTER + SLACK), np.sign(residual), 0.0)
             if not beyond.any():
                 break
-            if not (beyond * (sides == 0)).any():
-                return None
-            sides = np.where(sides == 0, beyond, sides)
+            new = beyond * (sides == 0)
+            sides += new
             rows = np.nonzero(sides)[0]
+            if not new.any() or len(rows) > _MOST_LIMITS:
+                return None
             normals = sparse.diags_array(sides[rows]) @ self.matrix[rows]
             moves = self.solve_system(normals.T.toarray())
             root = np.linalg.cholesky(normals @ moves + 1e-12 * np.eye(len(rows)))

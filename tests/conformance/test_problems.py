@@ -13,7 +13,6 @@ from crossfield.export.solvers_table import SOLVERS, suitability_in_format
 from crossfield.export.solving.local import SolveFiles, Solvers, choose_format
 from crossfield.export.verify.verify import attained_objective
 from crossfield.export.writing.nl_order import NlOrder
-from crossfield.models.field.triangles import singular_vertices
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.processes.deadline import Deadline
 from folders import contents
@@ -82,8 +81,8 @@ def field_with_any_jumps(instance):
 def with_indices_of(field, formulation):
     """The problem whose rings have the indices of a field."""
     indices = dict.fromkeys(field.instance.domain.ring_vertices.tolist(), 0)
-    vertex, index = singular_vertices(field)
-    indices |= dict(zip(vertex.tolist(), np.round(4 * index).astype(int).tolist(), strict=True))
+    spots = field.singularities
+    indices |= dict(zip(spots.vertex.tolist(), np.round(4 * spots.index).astype(int).tolist(), strict=True))
     return cf.formulate(replace(field.instance, indices=[*indices.items()]), formulation)
 
 

@@ -405,9 +405,8 @@ class _Prover:
         return self.least < least
 
     def _offer(self, z: Ints) -> bool:
-        """Whether integers are better than the best ones, which they then are."""
-        if not self.energy.has_sums(z):
-            return False
+        """Whether integers with the prescribed sums are better than the best ones, which they then are."""
+        z = self.energy.with_sums(z)
         total = self.energy.least_total(z)
         if better := bool(total < self.least * (1 - _BETTER) - 1e-12):
             self.z, self.least = z, total
