@@ -315,6 +315,13 @@ def draw_surfaces() -> None:
     surface_pictures.draw_pictures()
 
 
+def draw_strokes() -> None:
+    """Draw docs/pictures/stroke_*.png: good and bad strokes, for docs/guides/drawing.md."""
+    import stroke_pictures
+
+    stroke_pictures.draw_pictures()
+
+
 def write_architecture() -> None:
     """Write docs/architecture.svg and its table, as they are now."""
     import rooms
@@ -336,6 +343,7 @@ PAGES: dict[str, Callable[[], None]] = {
     "tutorials": draw_tutorials,
     "figures": draw_figures,
     "surfaces": draw_surfaces,
+    "strokes": draw_strokes,
     "proof": draw_proof,
     "architecture": write_architecture,
     "programs": write_programs,

@@ -24,6 +24,8 @@ TITLES: Final = {
     "mesh": "Meshes",
     "drawing": "Drawings of other programs",
 }
+COLUMNS: Final = {"mesh": "Mesh, and field."}
+"""Heads of the columns of pictures."""
 SHORT: Final = """Use the name of a sample in place of a sketch or mesh:
 
 - `crossfield solve mouse --size 48 --method bend -o out` makes the field of a drawing or computed surface,
@@ -86,5 +88,6 @@ def write_page() -> None:
             first = entry.description.partition(";")[0]
             description = f"{first[0].upper()}{first[1:]}."
             lines.append(f"- ![{entry.name}](pictures/{path.name})\n\n  **`{entry.name}`** {description}")
-        parts += [f"## {title}", "\n".join(lines)]
+        columns = COLUMNS.get(kind, "Drawing, field and surface.")
+        parts += [f"## {title}", columns, "\n".join(lines)]
     (DOCS / "gallery.md").write_text("\n\n".join(parts) + "\n")

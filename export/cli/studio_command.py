@@ -39,7 +39,7 @@ def studio_command(
         from ..studio.server import LOOPBACK, listen, serve
     except ModuleNotFoundError as error:
         raise InputError(
-            f"studio needs the package {error.name}; pip install 'crossfield[studio]'"
+            f"studio needs the package {error.name}; pip install '.[studio]' in a clone"
         ) from error
     with show_progress() as show:
         show("reading the drawing")

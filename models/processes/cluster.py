@@ -23,7 +23,7 @@ def connect_cluster(address: str) -> Iterator[Any]:
         import distributed
     except ModuleNotFoundError as error:
         raise InputError(
-            "a scheduler needs dask; pip install 'crossfield[cluster]' here and on the workers"
+            "a scheduler needs dask; pip install '.[cluster]' in a clone, here and on the workers"
         ) from error
     try:
         client: Any = distributed.Client(  # type: ignore[no-untyped-call]

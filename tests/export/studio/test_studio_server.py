@@ -160,4 +160,4 @@ def test_a_missing_package_is_reported_with_its_remedy(monkeypatch, capsys):
     for name in [module for module in sys.modules if module.startswith("crossfield.export.studio.server")]:
         monkeypatch.delitem(sys.modules, name)
     assert invoke(["studio", "--no-browser"]) == 1
-    assert "pip install 'crossfield[studio]'" in capsys.readouterr().err
+    assert "pip install '.[studio]'" in capsys.readouterr().err
