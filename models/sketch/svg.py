@@ -165,10 +165,11 @@ def _flatten(
     """
     root = Element(SVG + "svg")
     for shape in shapes:
-        data = path_data((shape.points - window[:2]) / shape.scale)
+        scale = shape.scale or 1.0
+        data = path_data((shape.points - window[:2]) / scale)
         style = ";".join(f"{key}:{value}" for key, value in styles[shape.element].items())
         shape.element.tag = SVG + "path"
-        shape.element.attrib = {"d": data, "transform": f"scale({shape.scale!r})", "style": style}
+        shape.element.attrib = {"d": data, "transform": f"scale({scale!r})", "style": style}
         root.append(shape.element)
     return root
 
@@ -385,12 +386,9 @@ def _find_faint(seen: Sequence[Seen], is_line: Bools) -> Bools:
     length = np.array([leg.sum() for leg in legs])
 
     def is_weak(kind: Bools) -> Bools:
-        drawn = np.flatnonzero(kind & (length > 0) & np.isfinite(strength))
-        if not len(drawn):
-            return kind & False
-        drawn = drawn[np.argsort(-strength[drawn], kind="stable")]
-        ahead = np.cumsum(length[drawn])
-        strong = strength[drawn[np.searchsorted(ahead, _STRONG * ahead[-1])]]
+        order = np.argsort(-np.where(kind, strength, np.nan), kind="stable")  # not numbers are last
+        ahead = np.cumsum(np.where(kind & np.isfinite(strength), length, 0.0)[order])
+        strong = strength[order[np.searchsorted(ahead, _STRONG * ahead[-1])]]
         return np.asarray(kind & (strength <= _FAINT * strong))
 
     weak = is_weak(np.ones(len(seen), dtype=bool))

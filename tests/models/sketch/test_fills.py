@@ -87,15 +87,6 @@ def test_pen_strokes_in_the_colour_of_the_page_are_none():
     assert more.sha256 == read(svg(ground + outline + flow)).sha256
 
 
-@for_each(
-    "body, message",
-    [('<text y="9">a</text>', "it has text, 1 in all"), (AREAS["page"], "areas without a stroke, 1")],
-)
-def test_what_is_no_stroke_is_named(body, message):
-    with pytest.raises(cf.InputError, match=message):
-        read(svg(body))
-
-
 def test_a_light_glyph_on_a_dark_page_is_read_by_its_outline():
     glyph = f'<rect width="100" height="100"/><path d="{BODY}" fill="white"/>'
     assert read(svg(glyph)).sha256 == read(svg(OUTLINE)).sha256

@@ -324,13 +324,6 @@ def test_a_part_without_a_curvature_line_is_left_out():
     assert ndimage.binary_fill_holes(instance.mask).sum() > instance.mask.sum() + 100
 
 
-def test_a_stroke_that_ends_a_little_beyond_the_outline_opens_no_part():
-    two = f'<path d="M10 10H90V90H10ZM10 60H90" {BLACK}/><path d="M30 15V62" {RED}/>'
-    instance = read(svg(two), 40)
-    assert instance.grid.parts == 1
-    assert not instance.mask[int((75 - instance.origin[1]) / instance.pixel_size)].any()
-
-
 @for_each("slope", [0.03, 0.6, 3])
 def test_a_cutting_line_leaves_no_gap(slope):
     rise = 40 * slope / max(1, slope)
@@ -374,6 +367,11 @@ REFUSED = {
     "bomb.png": (declared(60_000, 60_000), "absurdly many pixels"),
     "large.png": (declared(10_000, 10_000), "declares 10000 x 10000 pixels"),
     "nothing.svg": (svg(""), "draws no stroke"),
+    "words.svg": (svg('<text y="9">a</text>'), "it has text, 1 in all; convert it to paths"),
+    "ground.svg": (
+        svg('<rect width="100" height="100" fill="#eef"/>'),
+        "it has areas without a stroke, 1 in all",
+    ),
     "point.svg": (svg(f'<path d="M5 5L5 5" {BLACK}/>'), "draws no stroke"),
     "cut.svg": (svg(LINE)[:-9], "is not well-formed XML"),
     "page.svg": (b"<html><body/></html>", "<html>, not <svg>"),

@@ -57,19 +57,6 @@ def test_a_drawing_in_uneven_light_and_noise_has_nearly_the_strokes_of_the_clean
     assert (ink & ~near).sum() <= 0.01 * dark.sum()
 
 
-def test_evenly_lit_pictures_have_one_level_of_paper():
-    """All paper of one grey changes no more than rounding does."""
-    assert np.abs(picture(DRAWING * 0.8).ink - CLEAN).max() < 0.02
-
-
-def test_red_stays_red_in_the_shade():
-    pixels = drawing((210, 36, 47)) * np.linspace(1, 0.35, WIDTH)[:, None]
-    clean, shaded = picture(drawing((210, 36, 47))), picture(pixels)
-    strong = (clean.ink > 0.5) & (shaded.ink > 0.5)
-    assert (clean.red[strong] == shaded.red[strong]).mean() > 0.98
-    assert 0.2 < clean.red[strong].mean() < 1
-
-
 def test_what_is_most_frequent_is_paper():
     """Stripes are ink if they are narrow, and have no meaning if neither colour prevails."""
     stripes = [np.full((HEIGHT, WIDTH), 250.0) for _ in range(3)]
