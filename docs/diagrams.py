@@ -45,7 +45,7 @@ from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.choice import declare
 from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.instance import Instance
-from crossfield.models.smooth.polyvector import HOLDS
+from crossfield.models.smooth.bend import surface_field
 from matplotlib.figure import Figure
 from PIL import Image
 from plots import fixed_settings
@@ -83,15 +83,10 @@ def bare(axes: Any, title: str, *, equal: bool = True) -> None:
         axes.set_aspect("equal")
 
 
-def bend_field_of(instance: Instance) -> CrossField:
-    """The field of the method `bend`."""
-    return cf.bend_field(cf.polyvector_field(instance, hold=max(HOLDS)))
-
-
 @cache
 def mouse(size: int) -> CrossField:
     """The bend field of the sample `mouse`."""
-    return bend_field_of(cf.sample("mouse", size))
+    return surface_field(cf.sample("mouse", size))
 
 
 def panel(field: CrossField, width: float, left: float = 0.0, top: float = 0.0) -> PanelContent:

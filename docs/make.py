@@ -223,7 +223,7 @@ def write_gallery() -> None:
 
 def draw_tutorials() -> None:
     """Draw the fields and the surface of docs/tutorials/solver.md and drawing.md."""
-    from diagrams import bend_field_of
+    from crossfield.models.smooth.bend import surface_field
 
     problem, pictures = cf.formulate(cf.sample("ellipsoid", 7), "milp-mccormick"), DOCS / "pictures"
     milp = cf.solve(problem, solver="highs").field
@@ -232,7 +232,7 @@ def draw_tutorials() -> None:
     with tempfile.TemporaryDirectory() as name:
         drawing = Path(name) / "pebble.svg"
         drawing.write_text(re.findall(r"```xml\n(.*?)```", page, re.DOTALL)[0])
-        field = bend_field_of(cf.read_sketch(drawing, size=48))
+        field = surface_field(cf.read_sketch(drawing, size=48))
         cf.draw(field, pictures / "pebble_field.png", kind="overview", force=True)
         cf.write_surface(cf.surface(field), name, drawing=drawing, side=1000)
         shutil.copy(Path(name) / "overlay.png", pictures / "pebble_surface.png")

@@ -11,7 +11,7 @@ import crossfield as cf
 from crossfield.export.pictures.mesh_view import draw_mesh
 from crossfield.models.samples.samples import samples
 from crossfield.models.sketch.samples import SAMPLES
-from diagrams import bend_field_of
+from crossfield.models.smooth.bend import surface_field
 
 DOCS: Final = Path(__file__).resolve().parent
 DRAWINGS: Final = DOCS.parent / "tests" / "data" / "drawings"
@@ -52,7 +52,7 @@ class Entry:
             if isinstance(self.drawing, Path)
             else cf.sample(self.name, SIZE)
         )
-        return bend_field_of(instance)
+        return surface_field(instance)
 
 
 def entries() -> list[Entry]:

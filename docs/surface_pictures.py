@@ -20,8 +20,9 @@ from crossfield.export.surfaces.files import draw_strokes, lay_over
 from crossfield.export.surfaces.outline import find_outline
 from crossfield.models.instance.domain import Floats
 from crossfield.models.sketch.samples import SAMPLES
+from crossfield.models.smooth.bend import surface_field
 from crossfield.models.surface.surface import Surface
-from diagrams import bend_field_of, drawing_of
+from diagrams import drawing_of
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
@@ -108,7 +109,7 @@ def known_rows() -> list[Row]:
     rows = []
     for name in (name for name, entry in SAMPLES.items() if entry.kind == "analytic"):
         true = cf.analytic(name, SIZE)
-        first = cf.surface(bend_field_of(true.instance))
+        first = cf.surface(surface_field(true.instance))
         error, _, estimate = min(
             (mean_angle(side.normals, true.normals), number, side)
             for number, side in enumerate((first, first.flipped()))
@@ -125,7 +126,7 @@ def mean_angle(first: Floats, second: Floats) -> float:
 def sample_rows() -> list[Row]:
     """The drawn samples with the surfaces over their bend fields."""
     drawn = [name for name, entry in SAMPLES.items() if entry.kind == "sketch"]
-    return [Row(name, cf.surface(bend_field_of(cf.sample(name, SIZE)))) for name in drawn]
+    return [Row(name, cf.surface(surface_field(cf.sample(name, SIZE)))) for name in drawn]
 
 
 def draw_pictures() -> None:

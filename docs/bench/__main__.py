@@ -9,6 +9,7 @@ BENCHMARKS = {
     "closed": "proofs on closed surfaces, for docs/notebooks/mesh.md",
     "start": "CPU seconds of short commands",
     "studio": "the answer of the studio to a stroke",
+    "surfaces": "errors of surfaces by their fields",
     "writing": "the writers next to those of other programs",
 }
 

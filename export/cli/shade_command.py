@@ -64,8 +64,7 @@ def shade_command(
 def _read_or_compute_field(source: str, size: int | None) -> CrossField:
     """The field in a file, or that of the method bend. Raises InputError."""
     from ...models.field.field import CrossField
-    from ...models.smooth.bend import bend_field
-    from ...models.smooth.polyvector import HOLDS, polyvector_field
+    from ...models.smooth.bend import surface_field
 
     if size is None and Path(source).is_file() and source.lower().endswith((".npz", ".json")):
         content = read_field_or_instance(Path(source), None)
@@ -73,7 +72,7 @@ def _read_or_compute_field(source: str, size: int | None) -> CrossField:
         content = read_source(source, sketch={"size": size})
     if isinstance(content, CrossField):
         return content
-    return bend_field(polyvector_field(content, hold=max(HOLDS)))
+    return surface_field(content)
 
 
 def parse_hints(texts: list[str] | None) -> tuple[Hint, ...]:

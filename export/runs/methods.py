@@ -20,8 +20,8 @@ from ...models.search.box_qp import fit_in_box
 from ...models.search.greedy import greedy_field
 from ...models.search.search import search
 from ...models.search.starts import first_field, polyvector_start, start_fields
-from ...models.smooth.bend import bend_field
-from ...models.smooth.polyvector import HOLDS, polyvector_field, power_field
+from ...models.smooth.bend import surface_field
+from ...models.smooth.polyvector import polyvector_field, power_field
 from ..solutions.solution import Solution
 from ..solvers_table import SOLVERS
 from ..solving.local import names_of_solve, solve
@@ -155,8 +155,7 @@ def _find_polyvector(request: Request) -> Iterator[Candidate]:
 def _find_bend(request: Request) -> Iterator[Candidate]:
     request.progress("bend field")
     is_over = request.stop_at_limit()
-    hard = polyvector_field(request.instance, hold=max(HOLDS))
-    yield time_candidate("bend", lambda: bend_field(hard, stop=is_over))
+    yield time_candidate("bend", lambda: surface_field(request.instance, stop=is_over))
 
 
 def _find_by_search(request: Request) -> Iterator[Candidate]:

@@ -25,8 +25,7 @@ from ...models.sketch.curves import Curves
 from ...models.sketch.drawing_file import Drawing, parse_drawing
 from ...models.sketch.parallels import leave_out_parallels
 from ...models.sketch.read import drop_silhouette, find_mask, instance_of_mask
-from ...models.smooth.bend import bend_field
-from ...models.smooth.polyvector import HOLDS, polyvector_field
+from ...models.smooth.bend import surface_field
 from ...models.surface.hints import Hint
 from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
@@ -195,7 +194,7 @@ def compute_field(document: Document, size: int | None = None) -> tuple[DrawnIns
     instance = drawn.instance
     return drawn, _FIELDS.get_or_compute(
         instance.sha256,
-        lambda: bend_field(polyvector_field(instance, hold=max(HOLDS)), stop=is_stopped),
+        lambda: surface_field(instance, stop=is_stopped),
     )
 
 

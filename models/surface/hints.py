@@ -16,7 +16,7 @@ from ..instance.instance import Instance
 from ..instance.least_squares import Residuals
 from .stencils import GridLevel
 
-WEIGHT: Final = 0.1  # weight of each pixel of the disc about a hint, whose normals differ a little
+WEIGHT: Final = 0.3  # per pixel of the disc about a hint
 _DISC: Final = 0.05  # radius in parts of the root of the number of pixels
 
 
@@ -70,12 +70,12 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
 
 
 def hint_rows(hint: Hint, level: GridLevel) -> Residuals:
-    """The residuals that require the slopes of a hint on a disc of pixels of a level, at least one."""
+    """The residuals that require the slopes of a hint on average over a disc of pixels of a level."""
     grid, (top, left) = level.grid, level.corner
     away = np.hypot(
         grid.rows - ((hint.row - top) >> level.halved), grid.columns - ((hint.column - left) >> level.halved)
     )
     disc = away <= max(1.0, _DISC * np.sqrt(grid.size))
-    matrix = sparse.vstack([slope[disc] for slope in level.stencils.slopes], format="csr")
-    goal = np.repeat(hint.slopes, int(disc.sum()))
-    return Residuals(matrix, -goal, np.full(len(goal), WEIGHT))
+    count = int(disc.sum())
+    matrix = sparse.csr_array(np.stack([disc @ slope for slope in level.stencils.slopes]) / count)
+    return Residuals(matrix, -hint.slopes, np.full(2, WEIGHT * count))

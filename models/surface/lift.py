@@ -23,8 +23,8 @@ from .surface import Surface
 from .trust import confidence_of, doubts_of, right_angle_deviation
 
 FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
-WEIGHTS: Final = Weights(even=5e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
-CLEARLY: Final = 0.8  # ratio of energies below which a plane's surface is preferred to the dome's
+WEIGHTS: Final = Weights(even=1e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
+CLEARLY: Final = 0.95  # ratio of energies below which a plane's surface is preferred to the dome's
 INSIDE_OUT: Final = "inside out it has the same crosses: see whether it bulges the right way"
 """What the crosses of every surface leave undetermined."""
 TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z from -z

@@ -1,12 +1,13 @@
 """Surfaces over cross fields: near the truth, independent of the notation of crosses, and always ended."""
 
 import functools
+import json
 from dataclasses import replace
 
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.smooth.polyvector import HOLDS
+from crossfield.models.smooth.bend import surface_field
 from loops import for_each
 from moves import MOVES, lines
 from places import ROOT
@@ -19,10 +20,6 @@ def exact(name, size):
     """An analytic instance, and the field of its exact crosses."""
     true = cf.analytic(name, size)
     return true, cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle)
-
-
-def bent(instance):
-    return cf.bend_field(cf.polyvector_field(instance, hold=max(HOLDS)))
 
 
 def apart(first, second):
@@ -128,7 +125,7 @@ def test_crosses_at_right_angles_give_a_flat_sheet_and_the_doubt():
 @pytest.mark.slow
 @for_each("name", ["saddle", "singular"])
 def test_samples_are_trusted_but_not_at_singular_spots(name):
-    field = bent(cf.sample(name, 24))
+    field = surface_field(cf.sample(name, 24))
     lifted = cf.surface(field)
     assert lifted.doubts == ()
     at = field.instance.grid.number[field.singularities.row, field.singularities.column]
@@ -148,6 +145,21 @@ def test_crosses_of_no_surface_are_doubted():
 @pytest.mark.skipif(not KNOWN.is_dir(), reason="needs the drawings in ../shared/known_surfaces")
 def test_the_lowest_of_the_starts_is_found_on_a_drawing():
     """Where the systems of the coarsest level are not solved exactly, a start of less energy is missed."""
-    surface = cf.surface(bent(cf.read_sketch(KNOWN / "wave.clean.svg", size=48)))
+    surface = cf.surface(surface_field(cf.read_sketch(KNOWN / "wave.clean.svg", size=48)))
     assert not surface.doubts
     assert np.ptp(surface.heights[np.isfinite(surface.heights)]) > 30
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not KNOWN.is_dir(), reason="needs the drawings in ../shared/known_surfaces")
+def test_clean_drawings_have_small_errors():
+    errors = []
+    for name, truth in json.loads((KNOWN / "truth.json").read_text()).items():
+        lifted = cf.surface(surface_field(cf.read_sketch(KNOWN / f"{name}.clean.svg", size=48)))
+        places, normals = np.split(np.array(truth["normals"]), [2], axis=1)
+        at = ((places - lifted.instance.origin) / lifted.instance.pixel_size).astype(int)
+        pixel = lifted.instance.grid.number[np.minimum(at[:, 1], lifted.heights.shape[0] - 2), at[:, 0]]
+        found = lifted.normals[pixel[pixel >= 0]]
+        sides = [apart(found * side, normals[pixel >= 0]).mean() for side in ([1, 1, 1], [-1, -1, 1])]
+        errors.append(min(sides))
+    assert np.mean(errors) <= 10
