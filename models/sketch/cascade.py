@@ -233,9 +233,9 @@ def _replace_variables(text: str, variables: Mapping[str, str]) -> str:
 
 
 def background_of(style: Mapping[str, str]) -> str | None:
-    """The colour of the background that a style declares, as #rrggbb or #rrggbbaa; None without one."""
+    """The colour of the background that a style declares, as #rrggbb; None without an opaque one."""
     colours = (_paint_value("color", style.get(key, "")) for key in ("background-color", "background"))
-    return next((colour for colour in colours if colour and colour.startswith("#")), None)
+    return next((colour for colour in colours if colour and len(colour) == 7 and colour[0] == "#"), None)
 
 
 @lru_cache(maxsize=1024)

@@ -59,11 +59,12 @@ def shape_curves(
 
 def path_data(points: Floats) -> str:
     """Path data of cubics (k, 4, 2)."""
-    starts = np.flatnonzero(np.diff(run_numbers(points, np.zeros(len(points), dtype=np.int32)), prepend=-1))
-    text = [f"C{' '.join(f'{value:.9g}' for value in cubic[1:].ravel())}" for cubic in points]
-    for start in starts.tolist():
-        text[start] = f"M{points[start, 0, 0]:.9g} {points[start, 0, 1]:.9g}{text[start]}"
-    return "".join(text)
+    run = run_numbers(points, np.zeros(len(points), dtype=np.int32))
+    texts = ([f"{value:.9g}" for value in cubic] for cubic in points.reshape(-1, 8).tolist())
+    return "".join(
+        ("M" + " ".join(text[:2]) if is_start else "") + "C" + " ".join(text[2:])
+        for text, is_start in zip(texts, np.diff(run, prepend=-1), strict=True)
+    )
 
 
 def length_in_pixels(text: str) -> float | None:

@@ -127,11 +127,11 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     cascade = cascade_of("".join(element.itertext()) for element in root.iter() if tag_of(element) == "style")
     styles = cascade.declare(root)
     pictured = dict(styles)
-    _paint_background(root, styles, page)
+    background = background_of(styles[root])
     walk = _ElementWalk(_put_styles(root, styles), matcher)
     painted = list(walk.shapes(root, page))
     unread = _list_unread(pictured, cascade, walk)
-    shapes = _leave_out_areas(painted, page, matcher)
+    shapes = _leave_out_areas(painted, page, matcher, background or "#ffffff")
     pens = _find_filled_strokes([shape for shape in painted if len(shape.points)])
     if not pens and not sum(len(shape.points) for shape in shapes):
         areas, texts = len(painted), sum(tag_of(element) == "text" for element in root.iter())
@@ -145,10 +145,14 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     if max(walk.reach, *map(abs, window[:2])) > _FAR * max(window[2:]):
         framed = frame_drawing(_flatten(painted, walk.inherited, window), None, (0.0, 0.0, *window[2:]), side)
     if pens:
-        _paint_strokes(painted, _plain_colours(root, walk.styles, painted), pens, page, matcher)
+        strokes = [shape for shape in painted if shape.element in pens or shape.is_stroked]
+        ground = np.array(opaque_colour(background or choose_paper(strokes)))
+        _paint_strokes(
+            painted, _plain_colours(root, walk.styles, painted), pens, page, matcher, ground=ground
+        )
         curves = _trace_strokes(framed, page, window, unread, has_choice=matcher is not None)
     else:
-        seen, notes = see_strokes(framed, window, shapes)
+        seen, notes = see_strokes(framed, window, shapes, background or choose_paper(shapes))
         curves = _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
     for values in (curves.points, curves.curve, curves.red, curves.chosen, curves.faint):
         if values is not None:
@@ -172,18 +176,6 @@ def _flatten(
         shape.element.attrib = {"d": data, "transform": f"scale({scale!r})", "style": style}
         root.append(shape.element)
     return root
-
-
-def _paint_background(root: Element, styles: dict[Element, dict[str, str]], page: DrawingPage | None) -> None:
-    """Put the background that the style of a drawing declares behind its elements, as browsers do."""
-    colour = background_of(styles[root])
-    if page is not None and colour is not None:
-        sides = {
-            key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), page.view, strict=True)
-        }
-        sheet = Element(SVG + "rect", sides)
-        styles[sheet] = {"fill": colour, "stroke": "none"}
-        root.insert(0, sheet)
 
 
 def _find_filled_strokes(shapes: Sequence[PaintedShape]) -> set[Element]:
@@ -215,10 +207,11 @@ def _paint_strokes(
     pens: set[Element],
     page: DrawingPage | None,
     matcher: LabelMatcher | None,
+    *,
+    ground: Floats,
 ) -> None:
     """Paint strokes black, or red where they are curvature lines; white where as pale as the ground."""
-    strokes = [shape for shape in shapes if shape.element in pens or shape.is_stroked]
-    ground, any_line = np.array(opaque_colour(choose_paper(strokes))), False
+    any_line = False
     for shape, colour in zip(shapes, colours, strict=True):
         is_line = bool(is_red(colour))
         if matcher is not None:
@@ -289,7 +282,7 @@ def _trace_strokes(
 
 
 def _leave_out_areas(
-    shapes: list[PaintedShape], page: DrawingPage | None, matcher: LabelMatcher | None
+    shapes: list[PaintedShape], page: DrawingPage | None, matcher: LabelMatcher | None, background: str
 ) -> list[PaintedShape]:
     """The shapes without lines for those that are only filled.
 
@@ -298,7 +291,7 @@ def _leave_out_areas(
     """
     kept = [shape if shape.is_stroked else replace(shape, points=shape.points[:0]) for shape in shapes]
     grounds = [shape.paint for shape in shapes if shape.is_filled and _covers_page(shape, page)]
-    paper = np.array(opaque_colour(grounds[-1] if grounds else "#ffffff"))
+    paper = np.array(opaque_colour(grounds[-1] if grounds else background))
     areas = [
         number
         for number, shape in enumerate(shapes)

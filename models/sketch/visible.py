@@ -95,18 +95,18 @@ class _LineSamples:
 
 
 def see_strokes(
-    root: Element, window: Box, shapes: Sequence[PaintedShape]
+    root: Element, window: Box, shapes: Sequence[PaintedShape], paper: str
 ) -> tuple[list[Seen], tuple[str, ...]]:
     """The visible part of each shape, and notes on the strokes that are left out. Raises InputError.
 
-    root: the drawing, framed by the window: x, y, width and height. Its shapes get other styles.
+    root: the drawing, framed by the window: x, y, width and height. Its shapes get other styles. paper: the
+    colour behind it, as #rrggbb.
     """
     pixel = max(window[2:]) / max(int(root.attrib[side]) for side in ("width", "height"))
     samples = _sample_lines(shapes, window, pixel)
     styles = [shape.element.get("style", "") for shape in shapes]
     for shape, style in zip(shapes, styles, strict=True):
         shape.element.set("style", style + _widened(shape, pixel))
-    paper = choose_paper(shapes)
     shown, ground = picture_of(root, paper), None
     if any(shape.is_ground for shape in shapes):
         for shape, style in zip(shapes, styles, strict=True):
