@@ -55,6 +55,7 @@ class Cascade:
     unread: dict[Element, str] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
     checks: int = 0
+    length: int = 0
 
     def declare(self, root: Element) -> dict[Element, dict[str, str]]:
         """The style of every element under a root, without what it inherits. Raises InputError."""
@@ -100,6 +101,12 @@ class Cascade:
                 f"its style sheets take more than {MAX_RULE_CHECKS} comparisons; export it without"
             )
 
+    def count_characters(self, length: int) -> None:
+        """Count characters of rules, nested ones in full. Raises InputError beyond MAX_STYLE."""
+        self.length += length
+        if self.length > MAX_STYLE:
+            raise InputError(f"its style sheets have more than {MAX_STYLE} characters; export it without")
+
     def _valid_style(
         self, element: Element, declared: Iterable[_Declared], variables: Mapping[str, str]
     ) -> dict[str, str]:
@@ -124,11 +131,9 @@ def cascade_of(texts: Iterable[str]) -> Cascade:
     import cssselect2
     import tinycss2
 
-    cascade, length = Cascade(cssselect2.Matcher()), 0
+    cascade = Cascade(cssselect2.Matcher())
     for text in texts:
-        length += len(text)
-        if length > MAX_STYLE:
-            raise InputError(f"its style sheets have more than {MAX_STYLE} characters; export it without")
+        cascade.count_characters(len(text))
         try:
             rules = tinycss2.parse_stylesheet(text, skip_comments=True, skip_whitespace=True)
         except ValueError:  # a whole number of thousands of digits
@@ -146,6 +151,7 @@ def _add_rules(cascade: Cascade, rules: Iterable[Any], around: str = "") -> None
         if rule.type == "qualified-rule":
             text = _text(rule.prelude)
             if around:
+                cascade.count_characters(len(text) + max(text.count("&"), 1) * len(around))
                 text = text.replace("&", f":is({around})") if "&" in text else f":is({around}) {text}"
             if declared := _declared(rule.content):
                 _add_selector(cascade, text, declared)
@@ -156,7 +162,10 @@ def _add_rules(cascade: Cascade, rules: Iterable[Any], around: str = "") -> None
         elif kind in ("layer", "supports") or (
             kind == "media" and _text(rule.prelude).lower() in ("", "all", "screen")
         ):
-            content = f"{around}{{{_text(rule.content or [])}}}" if around else rule.content or []
+            content = rule.content or []
+            if around:
+                content = f"{around}{{{_text(content)}}}"
+                cascade.count_characters(len(content))
             _add_rules(cascade, tinycss2.parse_rule_list(content, skip_comments=True, skip_whitespace=True))
         elif kind in _STYLING:
             cascade.skipped.append(shortened(f"@{kind} {_text(rule.prelude)}".strip(), 40))

@@ -388,6 +388,10 @@ REFUSED = {
     "flat.svg": (svg(LINE, 'viewBox="0 0 0 9"'), "has no area"),
     "packed.svgz": (b"\x1f\x8b\x08" + b"0" * 40, "is compressed"),
     "deep.svg": (svg("<g>" * 30_000 + "</g>" * 30_000), "nested more than 50 deep"),
+    "nested.svg": (
+        svg(f"<style><![CDATA[{'a' * 20_000}{{{'& ' * 5000}{{fill:red}}}}]]></style>{LINE}"),
+        "its style sheets have more than 1000000 characters",
+    ),
     "long.svg": (svg(f'<path d="M0 0{"L1 1" * 3_000_000}" {BLACK}/>'), "characters of paths"),
 }
 
