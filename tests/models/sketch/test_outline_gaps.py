@@ -67,11 +67,6 @@ def test_solid_ink_and_hatching_are_warned_of_with_their_place():
     assert "strokes leave no room between them round (13" in text
 
 
-def test_drawings_off_their_page_are_warned_of():
-    off, *_ = in_black("M10 10H90V190H10Z").reading.warnings
-    assert off.startswith("1 stroke is hidden, wholly or in part, first <path> round (90, 100")
-
-
 @for_each(
     "lines, parts, named",
     [

@@ -52,11 +52,6 @@ def test_hatching_and_ruled_paper_are_left_out_and_reported(parallels, flow):
     assert all("are left out as hatching" in warning for warning in full.reading.warnings)
 
 
-def test_a_family_is_reported_with_its_place():
-    (note,) = drawing(HATCHING, BODY, FLOW).reading.warnings
-    assert note.startswith("14 parallel lines round (129.5, 170.5) are left out")
-
-
 @for_each(
     "lines",
     [
