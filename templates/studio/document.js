@@ -20,10 +20,7 @@ export function check(doc) {
 
 const SHARED = ["strokes", "mask", "hints"]; // by the steps of a history
 const texts = new WeakMap(); // of strokes
-function textOf(stroke) {
-  if (!texts.has(stroke)) texts.set(stroke, JSON.stringify(stroke));
-  return texts.get(stroke);
-}
+const textOf = stroke => texts.get(stroke) ?? texts.set(stroke, JSON.stringify(stroke)).get(stroke);
 /** A document as JSON without some of its parts. The text of a stroke is made once. */
 export const textWithout = (doc, parts) => `${JSON.stringify({ ...doc, ...Object.fromEntries(parts.map(part => [part, undefined])), strokes: undefined }).slice(0, -1)},"strokes":[${doc.strokes.map(textOf)}]}`;
 
@@ -56,7 +53,7 @@ export class History {
 }
 
 function bytes(text) {
-  const letters = atob(text), all = new Uint8Array(letters.length);
+  const letters = atob(text), all = new Uint8Array(letters.length); // Uint8Array.from takes 10 times as long
   for (let k = 0; k < all.length; k++) all[k] = letters.charCodeAt(k);
   return all;
 }

@@ -1,6 +1,5 @@
 // Pointers and keys of a picture. The pen, the mouse and the keyboard use its tool; a finger uses it where fingers draw,
-// and otherwise taps, while its swipes scroll the page; two fingers and the wheel move and zoom the view, and the pointer
-// moves it while the space bar is held.
+// and otherwise taps, while its swipes scroll the page; two fingers, the wheel, and the space bar move and zoom the view.
 
 const PALM = 800; // milliseconds after the pen in which a touch may be the palm
 const TAP = 10; // pixels of the screen that a finger moves at most in a tap

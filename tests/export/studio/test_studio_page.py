@@ -49,9 +49,33 @@ def pixels(browser):
 
 def test_a_session_from_the_first_stroke_to_the_saved_file(empty, tmp_path):
     browser = empty
-    drag(browser, circle(240, 300, 150))
+
+    def hint():
+        pressed = find(browser, "#marks [aria-pressed=true]").get_attribute("data-mark")
+        return find(browser, "#next").text, pressed
+
+    assert hint() == ("Draw the outline of a shape, and close it.", "cut")
+    drag(browser, circle(240, 300, 150)[:21])
+    assert hint() == ("Draw the outline of a shape, and close it.", "cut")
+    find(browser, "#undo").click()
+    drag(settled(browser), circle(240, 300, 150))
+    bends = ("Draw a line along which the surface bends.", "line")
+    assert hint() == bends
+    for button, expected in (("#undo", "cut"), ("#redo", "line")):
+        find(browser, button).click()
+        settled(browser)
+        assert hint()[1] == expected
+    assert hint() == bends
     drag(browser, [(95, 300), (170, 340), (240, 350), (310, 340), (385, 300)])
+    assert hint() == ("Draw a line across the others.", "line")
+    assert "arbitrary" in find(browser, "#surface-note").text
+    assert find(browser, "#doubts").text == "The field is not determined yet."
+    find(browser, "[data-mark=cut]").click()
+    assert hint() == ("Choose Curvature line. Draw a line across the others.", "cut")
+    find(browser, "[data-mark=line]").click()
     drag(browser, [(240, 155), (225, 230), (225, 370), (240, 445)])
+    assert hint() == ("", "line")
+    assert "arbitrary" not in find(browser, "#surface-note").text
     assert [stroke["mark"] for stroke in document(browser)["strokes"]] == ["cut", "line", "line"]
     whole = pixels(browser)
     assert "surface" in find(browser, "#times").text
@@ -88,36 +112,6 @@ def test_a_session_from_the_first_stroke_to_the_saved_file(empty, tmp_path):
     assert document(settled(browser))["strokes"] == []
     load(browser, tmp_path / "again.json", saved.read_bytes())
     assert document(browser) == before
-
-
-def test_hints_lead_to_a_determined_field(empty):
-    def hint():
-        return find(empty, "#next").text
-
-    def pressed():
-        return find(empty, "#marks [aria-pressed=true]").get_attribute("data-mark")
-
-    assert ("outline" in hint(), pressed()) == (True, "cut")
-    drag(empty, circle(240, 300, 150)[:21])
-    assert ("outline" in hint(), pressed()) == (True, "cut")
-    drag(empty, circle(240, 300, 150)[20:])
-    assert ("along which the surface bends" in hint(), pressed()) == (True, "line")
-    drag(empty, [(95, 300), (170, 320), (240, 350), (310, 330), (385, 300)])
-    drag(empty, [(110, 370), (170, 385), (240, 400), (310, 385), (370, 370)])
-    assert "across the others" in hint()
-    assert "arbitrary" in find(empty, "#surface-note").text
-    assert find(empty, "#doubts").text == "The field is not determined yet."
-    find(empty, "[data-mark=cut]").click()
-    assert "Choose Curvature line. Draw a line" in hint()
-    find(empty, "[data-mark=line]").click()
-    drag(empty, [(240, 155), (225, 230), (225, 370), (240, 445)])
-    assert hint() == ""
-    assert "arbitrary" not in find(empty, "#surface-note").text
-    assert [stroke["mark"] for stroke in document(empty)["strokes"]] == ["cut", "cut", *["line"] * 3]
-    for _ in range(5):
-        find(empty, "#undo").click()
-    settled(empty)
-    assert ("outline" in hint(), pressed()) == (True, "cut")
 
 
 def shown_at(browser, x, y):
