@@ -84,9 +84,9 @@ class CentredRows:
     less than here, because kappa differs from that of the mesh. memory, taken: most bytes for the check, and
     those that it takes without levels.
 
-    Prescribed indices (Lemma 10) shift the offsets of some rows, held (r,), and add `constant` to the energy.
-    given (r,): offsets without that. steps (3, t): ring, row and direction along the rings of these indices.
-    turns (k,): the sums of integers there. loose (r,): for the rounding of the constant.
+    Prescribed indices (Lemma 10) add `constant` to the energy and shift residuals by shift (r,), 0 where a
+    row is not held (r,). steps (3, t): ring, row and direction along the rings of these indices. turns (k,):
+    the sums of integers there. most (r,): of |r| in levels, pi/4 with prescribed indices.
     """
 
     def __init__(
@@ -113,43 +113,36 @@ class CentredRows:
         self.size, self.pairs, self.first = n, m, np.concatenate([first, point])
         self.second = np.concatenate([second, np.full(len(point), n)])
         self.ends = list(zip(self.first.tolist(), self.second.tolist()))
-        self.given, self.weight = np.concatenate([kappa, -theta]), np.concatenate([2 * weight, of_strokes])
+        self.offset, self.weight = np.concatenate([kappa, -theta]), np.concatenate([2 * weight, of_strokes])
         self.steps, self.turns = rings_of_indices(arrays, np.array([first, second]), kappa)
-        self._shift_offsets(arrays)
+        self.held, self.shift, self.constant = self._shift_residuals(arrays)
         self.rings, self.fixed = rings_of(arrays, first, second), self._fixed_points()
         self.limit = limits_of(self) if limit is None else limit
+        self.most = np.full(len(self.limit), QUARTER + RELATIVE) if len(self.turns) else self.limit
         self.slack = math.fsum(self.weight[:m] * (HALF + wrong) * wrong)  # |r| is at most pi/4
         self.centre = np.append(base.take_array(arrays, "centre", "<f8", n), 0.0)
         base.require(np.abs(self.centre) <= MOST_ANGLE, "centre", "is too large")
-        self.reach = self.reach_of(self.centre)
+        self.reach = (self.reach_of(self.centre) + np.abs(self.shift)) * (1 + np.abs(self.shift))
         self.half = np.append(base.take_array(arrays, "half", "|u1", n), 0).astype(np.int64)
         base.require(self.half <= np.where(self.fixed, 0, 1), "half", "is not 0, or 1 at a point not fixed")
         self.nearest = np.round(-self.residuals(self.centre) / HALF)
         self.residual = self.residuals(self.centre) + HALF * self.nearest
 
-    def _shift_offsets(self, arrays: dict[str, Array]) -> None:
-        """Lemma 10, without the deduction of rounding that depends on the energy."""
-        (ring, row, sign), given, size = self.steps, self.given, len(self.turns)
-        self.held, self.offset, self.constant = np.bincount(row, minlength=len(given)) > 0, given, 0.0
+    def _shift_residuals(self, arrays: dict[str, Array]) -> tuple[Array, Array, float]:
+        """Lemma 10: which rows are held, by how much residuals are shifted, and the constant."""
+        (ring, row, sign), size, count = self.steps, len(self.turns), len(self.offset)
+        held = np.bincount(row, minlength=count) > 0
         if size == 0:
-            return
-        potential = base.take_array(arrays, POTENTIAL, "<f8", size)
-        weight = np.where(self.held, self.weight, 1.0)
-        shift = np.bincount(row, sign * potential[ring], len(given)) / weight
+            return held, np.zeros(count), 0.0
+        potential, weight = base.take_array(arrays, POTENTIAL, "<f8", size), np.where(held, self.weight, 1.0)
+        shift = np.bincount(row, sign * potential[ring], count) / weight
         base.require(np.abs(shift) <= MOST_ANGLE, POTENTIAL, "shifts a residual too far")
-        self.offset, reach = given - shift, np.abs(given) + np.abs(shift)
-        rest = np.bincount(ring, (sign * self.offset[row]), size) + HALF * self.turns
-        constant = 2 * math.fsum(potential * rest) + math.fsum(weight * shift * shift)
+        sums = np.bincount(ring, sign * self.offset[row], size) + HALF * self.turns
+        constant = 2 * math.fsum(potential * sums) - math.fsum(weight * shift * shift)
+        reach = np.bincount(ring, np.abs(self.offset)[row], size) + HALF * np.abs(self.turns)
+        error = math.fsum(np.abs(potential) * reach) + math.fsum(weight * np.abs(shift) * (1 + np.abs(shift)))
         margin = MARGIN + base.PRECISION * int(np.bincount(ring).max())
-        most = np.bincount(ring, reach[row], size) + HALF * np.abs(self.turns)
-        self.constant = constant - margin * math.fsum(np.abs(potential) * most)
-        self.loose = np.where(self.held, weight * (1 + np.abs(shift)) * (1 + reach), 0.0)
-
-    def deduct_rounding(self, threshold: float) -> None:
-        """Deduct from the constant what rounding costs fields with an energy of at most the threshold."""
-        if len(self.turns):
-            far = 1 + np.sqrt(threshold / np.where(self.held, self.weight, 1.0))  # limits residuals
-            self.constant -= MARGIN * math.fsum(self.loose * far)
+        return held, shift, constant - 2 * margin * error
 
     def residuals(self, angle: Array) -> Array:
         """Residuals of all rows at z = 0; angle (n + 1,), 0 at the ground."""
@@ -292,7 +285,7 @@ def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring
 
 
 def limits_of(rows: CentredRows) -> Array:
-    """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,), pi/4 of rows that are held.
+    """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,), pi/4 where it is held.
 
     Any potential gives a lower bound of a resistance. Here it is a difference of two columns of an inverse.
     """
@@ -497,8 +490,8 @@ def costs_of(level: CellLevel) -> Array:
         x = np.arange(n) + n * turn + shift
         a = rows.residual[:, None] + h * x
         deducted = np.where((shift == 0) & (np.abs(x) <= 1), np.abs(x), 0.25)
-        cost = rows.weight[:, None] * (a * a - h * h * deducted)
-        within = np.abs(a) <= rows.limit[:, None] + h * (1 + RELATIVE)
+        cost = rows.weight[:, None] * ((a - rows.shift[:, None]) ** 2 - h * h * deducted)
+        within = np.abs(a) <= rows.most[:, None] + h * (1 + RELATIVE)
         best = np.where(within, np.minimum(best, cost), best)
     for corner in level.corners():
         usable[corner[level.allowed]] = True
@@ -603,15 +596,10 @@ def possible_turns(level: CellLevel, squares: Array) -> Array:
     rows, table, h = level.rows, level.squares, HALF / level.divisions
     left = squares & np.logical_and(*table.at_ends(table.have_partners(squares)))
     first, second = table.at_ends(h * (level.cells + rows.half[level.owner] / 2))
-    row, reach = table.row[left], rows.limit + h * (1 + RELATIVE) + RELATIVE
+    row, reach = table.row[left], rows.most + h * (1 + RELATIVE) + RELATIVE
     size, reach = rows.residual[row] + (first - second)[left], reach[row]
     possible = (np.abs(size + HALF * turn) - reach <= 0 for turn in TURNS)
     return np.array([np.bincount(row[of_turn], minlength=len(rows.first)) > 0 for of_turn in possible]).T
-
-
-def forced_of(rows: CentredRows, turns: Array) -> Array:
-    """Whether each pair has one possible turn, 0, and its integer can change alone, (m,)."""
-    return (turns[: rows.pairs] == CENTRAL).all(axis=1) & ~rows.held[: rows.pairs]
 
 
 def cases_of(turns: Array) -> list[tuple[int, ...]]:
@@ -622,19 +610,33 @@ def cases_of(turns: Array) -> list[tuple[int, ...]]:
 
 
 def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
-    """Lemma 6: a lower bound of the energy in all cases, by a tangent at the angles (k, n) of each."""
-    cases = cases_of(turns)
+    """Lemma 6: a lower bound of the energy in all cases, by a tangent at the angles (k, n) of each.
+
+    With prescribed indices, cases have these, and residuals at pi/4 cannot grow: the tangent has multipliers.
+    """
+    cases, (ring, row, sign) = cases_of(turns), rows.steps
     if not cases or len(cases) != len(angles):
         return -math.inf
     bounds: list[float] = []
     for turn, angle in zip(cases, np.column_stack([angles, np.zeros(len(angles))])):
-        r = rows.residuals(angle) + HALF * (rows.nearest + np.array(turn))
+        z = rows.nearest + np.array(turn)
+        if (np.bincount(ring, sign * z[row], len(rows.turns)) != rows.turns).any():
+            continue
+        r = rows.residuals(angle) + HALF * z
         force = 2 * rows.weight * r
         slope = np.bincount(rows.first, force, rows.size + 1) - np.bincount(rows.second, force, rows.size + 1)
-        away = np.abs(angle - rows.centre) + np.where(rows.fixed, 0.0, np.pi)
-        size = np.sum(rows.weight * (1 + r * r) * (1 + rows.reach_of(angle))) / 4 * (1 + away.max())
-        bounds.append(math.fsum(rows.weight * r * r) - math.fsum(np.abs(slope) * away) - MARGIN * float(size))
-    return min(bounds) + rows.constant
+        at = np.nonzero((np.abs(r) > QUARTER - FLAT) & (len(rows.turns) > 0))[0]
+        normal = np.zeros((rows.size + 1, len(at)))
+        normal[rows.first[at], np.arange(len(at))] = np.sign(r[at])
+        normal[rows.second[at], np.arange(len(at))] = -np.sign(r[at])
+        free = ~rows.fixed
+        pull = np.maximum(np.linalg.lstsq(normal[free], -slope[free], rcond=None)[0], 0.0) if len(at) else at
+        slope += normal @ pull
+        away, reach = np.abs(angle - rows.centre) + np.where(rows.fixed, 0.0, np.pi), rows.reach_of(angle)
+        size = np.sum(rows.weight * (1 + r * r) * (1 + reach)) / 4 + pull @ (1 + reach[at])
+        total = math.fsum(rows.weight * r * r) + math.fsum(pull * (np.abs(r[at]) - QUARTER - RELATIVE))
+        bounds.append(total - math.fsum(np.abs(slope) * away) - MARGIN * float(size * (1 + away.max())))
+    return min(bounds, default=math.inf)
 
 
 # Section 5: charges ----------------------------------------------------------------------------------------
@@ -677,8 +679,8 @@ class Charges:
         self.resistance, turns, reach, far = (
             np.bincount(loop, numbers, self.size)
             for numbers in (
-                1 / rows.weight[row], sign * rows.offset[row] / HALF, rows.limit[row] / HALF,
-                np.abs(rows.offset[row]),
+                1 / rows.weight[row], sign * (rows.offset - rows.shift)[row] / HALF, rows.limit[row] / HALF,
+                (np.abs(rows.offset) + np.abs(rows.shift))[row],
             )
         )  # fmt: skip
         self.margin = MARGIN + base.PRECISION * int(np.diff(start).max(initial=0))
@@ -828,7 +830,6 @@ def check_arrays(
     rows = CentredRows(arrays, limit, memory)
     energy, error, same = energy_of(arrays, rows)
     threshold = base.number_in(head, "threshold", energy + error, math.inf)
-    rows.deduct_rounding(threshold)
     bounds, work, squares = list[float](), 0, np.zeros(0, bool)
     turns = np.ones((len(rows.first), len(TURNS)), bool)
     for number, count in enumerate(divisions):
@@ -856,7 +857,7 @@ def check_arrays(
     least = max(*bounds, cases_bound(rows, turns, angles), charges_bound(arrays, rows, threshold))
     proven = max(0.0, min(least, energy - error) - rows.slack)
     bound = max(0.0, proven - base.SPARE * (1 + proven))
-    status, forced = base.status_of(energy, bound), forced_of(rows, turns) & same
+    status, forced = base.status_of(energy, bound), (turns[: rows.pairs] == CENTRAL).all(axis=1) & same
     claim = base.Findings(status, 2, energy, bound, forced, bounds)
     base.check_claim(head, claim, proven, error)
     return claim
@@ -891,7 +892,7 @@ def energy_of(arrays: dict[str, Array], rows: CentredRows) -> tuple[float, float
     base.require(inside, "alpha", "is outside its window")
     p = p.astype(np.int64)
     base.require(np.abs(p) <= base.MOST_JUMP, "p", "is no jump")
-    r = rows.residuals(np.append(alpha, 0.0)) + (rows.given - rows.offset)
+    r = rows.residuals(np.append(alpha, 0.0))
     r[:m] += HALF * p
     (ring, row, sign), wrong = rows.steps, "has other sums along the rings of prescribed indices"
     base.require(np.bincount(ring, sign * p[row], len(rows.turns)) == rows.turns, "p", wrong)

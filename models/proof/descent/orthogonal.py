@@ -330,7 +330,6 @@ class _Prover:
         arrays["divisions"] = np.zeros(0, np.int32)
         arrays["cases"] = np.zeros((0, self.instance.domain.size))
         rows = checker.CentredRows(arrays, self.limit)
-        rows.deduct_rounding(self.least)
         energy, error, _ = checker.energy_of({"alpha": best.alpha, "p": best.p}, rows)
         most = energy * (1 + _BETTER) + 2 * error
         return _TimedChain(arrays=arrays, threshold=most, convex=self.charges), rows
@@ -428,9 +427,11 @@ class _Prover:
         chain.arrays["divisions"] = np.append(chain.arrays["divisions"], np.int32(level.divisions))
         chain.levels.append(LevelFacts(np.pi / 2 / level.divisions, len(dual.state.unary), excess.bound))
         turns = checker.possible_turns(level, squares)
-        chain.forced = int(checker.forced_of(rows, turns).sum())
+        chain.forced = int((turns[: rows.pairs] == checker.CENTRAL).all(axis=1).sum())
         cases = [(rows.nearest + np.array(case)).astype(np.int32) for case in checker.cases_of(turns)]
-        angles = np.array([self.energy.fit_angles(z) for z in cases]).reshape(-1, rows.size)
+        fitted = (self.energy.fit_in_limits(z) for z in cases)
+        of_cases = [rows.centre[:-1] if angle is None else angle for angle in fitted]
+        angles = np.array(of_cases).reshape(-1, rows.size)
         chain.arrays["cases"] = angles
         chain.convex = max(self.charges, checker.cases_bound(rows, turns, angles))
         for z in cases:

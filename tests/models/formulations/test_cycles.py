@@ -159,7 +159,7 @@ def test_the_best_of_all_indices_of_a_vertex_is_the_optimum(name):
 @pytest.mark.parametrize(
     "name, count", [("tetrahedron", 2), ("cube", 5), ("torus with strokes", 4), ("grid", 3)]
 )
-def test_searches_find_the_least_energy_with_given_indices(name, count):
+def test_searches_and_proofs_find_the_least_energy_with_given_indices(name, count):
     """Far from those of the free optimum; on the first two, residuals are at their limits."""
     instance, rng = INSTANCES[name](), np.random.default_rng(1)
     vertices, defect = instance.domain.ring_vertices, instance.domain.rings.defect
@@ -170,6 +170,8 @@ def test_searches_find_the_least_energy_with_given_indices(name, count):
     field = cf.search(instance, rounds=2).field
     field.check_instance(instance)
     assert field.energy().total == pytest.approx(least.objective, rel=1e-6)
+    proof = cf.prove(instance, start=field, work=10_000)
+    assert 0.8 * least.objective < proof.bound < (1 + 1e-6) * least.objective
     with pytest.raises(cf.InstanceError, match=r"has index .*/4 at vertex .* is prescribed"):
         cf.search(instance, rounds=0, start=cf.power_field(instance))
 

@@ -70,11 +70,17 @@ def test_no_bound_exceeds_the_optimum_with_given_indices(seed, grid):
         except cf.InstanceError:  # residuals of at most pi/4 do not reach it
             continue
         optimum, z = try_all_integers(part)
+        energy = OrthogonalEnergy.of(part)
+        if energy.least_total(z) > optimum + 1e-9:
+            continue
+        for worse in map(energy.with_sums, worse_integers(part, z, seed)):
+            if energy.least_total(worse) < np.inf:
+                assert prove_from(part, worse, levels=2).bound <= optimum + 1e-9
         proof = cf.prove(part, work=20_000)
         assert proof.bound <= optimum + 1e-9 <= proof.energy + 2e-9
         proof.field.check_instance(part)
         closed += proof.status == "optimal"
-        if len(part.theta) and OrthogonalEnergy.of(part).least_total(z) < np.inf:
+        if len(part.theta):
             assert keeps_optimum(part, z, prove_from(part, z, levels=3))
     assert closed
 
