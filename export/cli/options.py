@@ -455,6 +455,15 @@ Flip = Annotated[
         "--flip", help="Turn the surface inside out: bumps become hollows. Hints, if any, take precedence."
     ),
 ]
+Concave = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--concave",
+        metavar="X,Y",
+        help="A place in the drawing, in its coordinates, whose part of the surface is a bowl, not a bump."
+        " May be repeated.",
+    ),
+]
 Hints = Annotated[
     list[str] | None,
     typer.Option(

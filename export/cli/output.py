@@ -223,12 +223,8 @@ def show_surface(surface: Surface, facts: dict[str, Any], folder: Path) -> None:
     )
     for name, text in facts["support"].items():
         print_line(_wrap(f"{name}: {text}"))
-    for text in surface.freedom:
-        print_line(_wrap(f"undetermined: {text}"))
-    if surface.freedom:
-        print_line(
-            _wrap("--flip turns it inside out, --hint ROW,COLUMN,SLANT,TILT gives the normal at a pixel")
-        )
+    for choice in surface.freedom:
+        print_line(_wrap(f"undetermined: {choice}; choose, for example with {choice.option}"))
     for doubt in surface.doubts:
         print_notice(f"in doubt: {doubt}")
     pictures = facts["pictures"]

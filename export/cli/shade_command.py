@@ -23,6 +23,7 @@ def shade_command(
     *,
     size: options.Size = None,
     flip: options.Flip = False,
+    concave: options.Concave = None,
     hint: options.Hints = None,
     side: options.PictureSide = None,
     underlay: options.Underlay = None,
@@ -34,28 +35,29 @@ def shade_command(
     All pictures have the page of the drawing, so they lie on it as layers, transparent outside the mask. The
     normal map follows OpenGL: red to the right, green up. Without a page, pictures show the grid.
 
-    Crosses do not determine which parts are bumps and which are hollows (--flip), nor the depth of parts that
-    bend in one direction only (--hint). What is drawn, what is guessed, where crosses do not fit, and doubts
-    are printed and written to surface.json. A surface without doubts can be wrong too, most of all far from
-    strokes.
+    Crosses do not determine which parts are bumps and which are hollows (--flip, --concave), nor the depth
+    of parts that bend in one direction only (--hint). What is drawn, what is guessed, where crosses do not
+    fit, what is undetermined, and doubts are printed and written to surface.json. A surface without doubts
+    can be wrong too, most of all far from strokes.
     """
     from ...models.surface.lift import surface
     from ...models.written_files import check_targets
     from ..pictures.underlay import read_underlay
     from ..surfaces.files import FILES, REPORT, choose_view, write_surface
 
-    hints, underlay = parse_hints(hint), underlay or find_drawing(source)
+    hints, bowls = parse_hints(hint), parse_places(concave)
+    underlay = underlay or find_drawing(source)
     check_targets(output, FILES, reads=[path for path in (source, underlay) if path is not None], force=force)
     with show_progress() as show:
         show("reading, and the field of bend unless it is given")
         field = _read_or_compute_field(source, size)
         drawing = None if underlay is None else read_underlay(underlay, on=field.instance)
         choose_view(field.instance, drawing, side)  # checks the side before the work
-        solid = surface(field, hints, flip=flip, progress=show)
+        solid = surface(field, hints, flip=flip, concave=bowls, progress=show)
         degrees = [[h.row, h.column, *(round(math.degrees(a), 4) for a in (h.slant, h.tilt))] for h in hints]
         named = [dict(zip(("row", "column", "slant", "tilt"), hint, strict=True)) for hint in degrees]
         show("drawing and writing")
-        about = {"flipped": flip, "hints": named}
+        about = {"flipped": flip, "concave": bowls, "hints": named}
         write_surface(solid, output, drawing=drawing, side=side, about=about, force=force)
     document = json.loads((output / REPORT).read_text("utf-8"))
     print_result(document, lambda: show_surface(solid, document, output), as_json=as_json)
@@ -90,3 +92,17 @@ def parse_hints(texts: list[str] | None) -> tuple[Hint, ...]:
             ) from error
         hints.append(hint)
     return tuple(hints)
+
+
+def parse_places(texts: list[str] | None) -> list[tuple[float, float]]:
+    """Places from texts. Raises InputError for a malformed text."""
+    places = []
+    for text in texts or ():
+        try:
+            x, y = map(float, text.split(","))
+        except ValueError as error:
+            raise InputError(
+                f"--concave {shortened(text)!r} is malformed; give X,Y as in 120,80.5"
+            ) from error
+        places.append((x, y))
+    return places

@@ -121,7 +121,7 @@ def surface_step(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
         "rows": instance.mask.shape[0],
         "columns": instance.mask.shape[1],
         "doubts": list(lifted.doubts),
-        "freedom": list(lifted.freedom),
+        "freedom": [choice.document() for choice in lifted.freedom],
         "suspects": find_suspects(document, misfit),
     }
 

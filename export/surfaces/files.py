@@ -249,7 +249,7 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
     return {
         "doubts": list(surface.doubts),
         "support": describe_support(surface.field, np.radians(off)),
-        "freedom": list(surface.freedom),
+        "freedom": [choice.document() for choice in surface.freedom],
         **{name: round(float(value), 4) for name, value in numbers.items()},
     }
 

@@ -69,6 +69,21 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
             raise InputError(f"{place} has the tilt {hint.tilt}, not a direction; give a finite angle")
 
 
+def find_pixels(places: Iterable[tuple[float, float]], instance: Instance) -> list[tuple[int, int]]:
+    """Row and column at places in the drawing. Raises InputError for one outside the mask."""
+    pixels = []
+    for x, y in places:
+        column, row = np.floor((np.array([x, y]) - instance.origin) / instance.pixel_size)
+        inside = 0 <= row < instance.grid.height and 0 <= column < instance.grid.width
+        if not inside or not instance.mask[int(row), int(column)]:
+            raise InputError(
+                f"the place ({x:g}, {y:g}) lies outside the mask of {instance.name}; give one inside, in the "
+                "coordinates of the drawing"
+            )
+        pixels.append((int(row), int(column)))
+    return pixels
+
+
 def hint_rows(hint: Hint, level: GridLevel) -> Residuals:
     """The residuals that require the slopes of a hint on average over a disc of pixels of a level."""
     grid, (top, left) = level.grid, level.corner

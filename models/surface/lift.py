@@ -17,7 +17,8 @@ from ..instance.grid import Grid
 from ..processes.blas_threads import one_thread
 from ..processes.deadline import IsOver, Progress, Stop, silent, stop_function
 from .equations import FORGIVEN, Equations, Weights, descend, normals_of
-from .hints import Hint, check_hints, hint_rows
+from .freedom import LARGE, Freedom, find_deepest, find_open_depth, place_of
+from .hints import Hint, check_hints, find_pixels, hint_rows
 from .stencils import Crosses, GridLevel, Stencils, levels_of
 from .surface import Surface
 from .trust import confidence_of, doubts_of, right_angle_deviation
@@ -25,8 +26,6 @@ from .trust import confidence_of, doubts_of, right_angle_deviation
 FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
 WEIGHTS: Final = Weights(even=1e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
 CLEARLY: Final = 0.95  # ratio of energies below which a plane's surface is preferred to the dome's
-INSIDE_OUT: Final = "inside out it has the same crosses: see whether it bulges the right way"
-"""What the crosses of every surface leave undetermined."""
 TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z from -z
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
@@ -37,6 +36,7 @@ def surface(
     hints: Iterable[Hint] = (),
     *,
     flip: bool = False,
+    concave: Iterable[tuple[float, float]] = (),
     stop: Stop | None = None,
     progress: Progress = silent,
 ) -> Surface:
@@ -59,6 +59,9 @@ def surface(
         from there. Hints also choose among surfaces of different depth with the same crosses.
     flip
         Whether to turn all other parts inside out.
+    concave
+        Places (x, y) in the drawing whose parts are bowls: they lean inward at their border on the whole, or
+        downward where that is undecided, also with `flip`. Hints of 10 degrees slant or more take precedence.
     stop
         A function that returns whether to stop, or an event. The best heights so far are then returned with
         a doubt.
@@ -73,44 +76,57 @@ def surface(
     Raises
     ------
     InputError
-        For a hint outside the mask, or with angles that no normal has.
+        For a hint or place outside the mask, or a hint with angles that no normal has.
 
     """
     instance, all_hints, is_over = field.instance, tuple(hints), stop_function(stop)
     check_flag("flip", flip)
     check_hints(all_hints, instance)
+    bowls = find_pixels(concave, instance)
     part_of, parts = ndimage.label(instance.mask, structure=np.ones((3, 3)))
     heights = np.full((instance.grid.height + 1, instance.grid.width + 1), np.nan)
-    parts_done, all_crosses = [], Crosses.of(field)
+    freedom: list[Freedom] = []
+    all_crosses = Crosses.of(field)
     for number, window in enumerate(ndimage.find_objects(part_of), 1):
         progress("surface" if parts == 1 else f"surface, part {number} of {parts}")
         mask = part_of[window] == number
         stencils, crosses = Stencils(Grid(mask)), all_crosses.at(instance.grid.number[window][mask])
         level = GridLevel(stencils, crosses, (window[0].start, window[1].start))
         part_hints = [hint for hint in all_hints if part_of[hint.row, hint.column] == number]
-        z = _solve_part(level, part_hints, is_over, flip=flip)
+        is_bowl = any(part_of[bowl] == number for bowl in bowls)
+        z, other = _solve_part(level, part_hints, is_over, flip=flip or is_bowl)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
-        parts_done.append((level.grid.size, part_hints))
-    _, part_hints = max(parts_done, key=itemgetter(0))
+        if level.grid.size >= LARGE * instance.grid.size:
+            if not (is_bowl or _decide_side(part_hints)):
+                middle = place_of(instance, *find_deepest(part_of == number))
+                freedom.append(Freedom("side", number, level.grid.size, middle))
+            if other:
+                place = place_of(instance, other.row, other.column)
+                freedom.append(Freedom("depth", number, level.grid.size, place, other))
     off = right_angle_deviation(field, heights)
-    freedom = () if _decide_side(part_hints) else (INSIDE_OUT,)
-    lifted = Surface(field, heights, confidence_of(field, off), (), freedom)
+    lifted = Surface(field, heights, confidence_of(field, off), (), tuple(freedom))
     slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
     late = ("time was over before it had settled",) if is_over() else ()
     return replace(lifted, doubts=(*doubts_of(field, off, slant), *late))
 
 
-def _solve_part(part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool) -> Floats:
-    """The heights of least energy: all starts on the coarsest level, the lowest one on all finer ones."""
+def _solve_part(
+    part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool
+) -> tuple[Floats, Hint | None]:
+    """The heights of least energy, and a normal of another surface with the same crosses if there is one.
+
+    All starts are solved on the coarsest level, and the lowest one on all finer ones.
+    """
     coarse, *finer = levels_of(part)
     dome, *planes = ([*_from_start(coarse, z, hints, is_over, flip=flip)] for z in coarse.initial_heights)
     candidates = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
     _, z = min(candidates, key=itemgetter(0))
+    other = find_open_depth(coarse, z, [hint_rows(hint, coarse) for hint in hints])
     for level in finer:
         z = _descend_with_hints(level, level.interpolate(coarse, z), hints, is_over)[1]
         coarse = level
-    return z if hints else _orient(part, z, flip=flip)
+    return z if hints else _orient(part, z, flip=flip), other
 
 
 def _from_start(

@@ -11,6 +11,7 @@ from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.instance import Instance
 from ..previews import Pictured
+from .freedom import Freedom
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +32,8 @@ class Surface(Pictured):
         Sentences with reasons not to trust the surface. Without any, one surface fits the crosses, which may
         still be wrong between strokes.
     freedom
-        Sentences that describe other surfaces with the same crosses; flatter and deeper ones often fit too.
+        Choices that the crosses leave open, with the option that decides each. Flatter and deeper surfaces
+        often fit too where none is named.
 
     """
 
@@ -39,7 +41,7 @@ class Surface(Pictured):
     heights: Floats
     confidence: Floats
     doubts: tuple[str, ...] = ()
-    freedom: tuple[str, ...] = ()
+    freedom: tuple[Freedom, ...] = ()
 
     def __repr__(self) -> str:
         deep = np.nanmax(self.heights) - np.nanmin(self.heights)

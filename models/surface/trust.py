@@ -11,6 +11,7 @@ from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.instance import Instance
 from .equations import Equations, Weights
+from .freedom import find_deepest, place_of
 from .stencils import Crosses, Stencils, corners_of_blocks
 
 OFF: Final = np.radians(10)  # lines whose angle in space deviates more from a right angle do not fit
@@ -57,7 +58,7 @@ def describe_support(field: CrossField, off: Floats) -> dict[str, str]:
     free = np.ones(instance.mask.shape, dtype=bool)
     free[tuple(instance.stroke_pixels.T)] = False
     away, unfit = ndimage.distance_transform_edt(free)[instance.mask], off > OFF
-    far, far_at = away.max(), _describe_place(instance, away)
+    far, far_at = away.max(), _describe_place(instance, *np.argwhere(instance.mask)[np.argmax(away)])
     sentences = {
         "drawn": f"{1 - np.mean(away > 0):.0%} of the pixels of the grid lie on a stroke, which gives the "
         "direction of one line",
@@ -66,17 +67,15 @@ def describe_support(field: CrossField, off: Floats) -> dict[str, str]:
         "fitting": f"on {1 - unfit.mean():.0%} of the pixels the two lines meet on the surface within "
         f"{np.degrees(OFF):g} degrees of a right angle, as curvature lines do",
     }
-    if unfit.any():
-        image = np.zeros(np.add(instance.mask.shape, 2))
-        image[1:-1, 1:-1][instance.mask] = unfit
-        depth = ndimage.distance_transform_edt(image)[1:-1, 1:-1][instance.mask]
-        place = _describe_place(instance, depth)
+    if round(unfit.mean(), 2) > 0:  # else all pixels fit, as stated
+        picture = instance.mask.copy()
+        picture[instance.mask] = unfit
+        place = _describe_place(instance, *find_deepest(picture))
         sentences["not fitting"] = f"above all round {place}; distrust normals there"
     return sentences
 
 
-def _describe_place(instance: Instance, values: Floats) -> str:
-    """The middle of the pixel with the greatest value, in the coordinates of the drawing."""
-    pixel = np.argwhere(instance.mask)[np.argmax(values)]
-    x, y = instance.origin + instance.pixel_size * (pixel[::-1] + 0.5)
-    return f"({x:.4g}, {y:.4g})"
+def _describe_place(instance: Instance, row: int, column: int) -> str:
+    """The middle of a pixel in the coordinates of the drawing."""
+    x, y = place_of(instance, row, column)
+    return f"({x:g}, {y:g})"

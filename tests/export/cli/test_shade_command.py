@@ -28,8 +28,8 @@ def test_a_sketch_an_instance_and_a_field_give_the_surface_of_the_function(saved
         assert contents(tmp_path / str(number)) == contents(tmp_path / "0"), source
     out = capsys.readouterr().out
     assert "mouse: 6 x 6" in out
-    assert "undetermined: inside out it has the same crosses" in out
-    assert "--flip" in out
+    assert "undetermined: the part at" in out
+    assert "--concave" in out
     assert "pictures show the page of the drawing, 48 x 40 pixels" in out
     assert str(tmp_path / "2") in out
     surface = cf.surface(field)
@@ -41,11 +41,13 @@ def test_a_sketch_an_instance_and_a_field_give_the_surface_of_the_function(saved
 
 
 def test_a_surface_is_flipped_and_hinted(saved, tmp_path, capsys):
+    side = cf.surface(cf.read_field(saved)).freedom[0]
     options = "--flip --hint 3,3,20,90 --hint 1,4,30.5,-45 --side 36 --json".split()  # noqa: SIM905
-    assert invoke(["shade", saved, *options, "-o", str(tmp_path)]) == 0
+    assert invoke(["shade", saved, *options, *side.option.split(), "-o", str(tmp_path)]) == 0
     report = json.loads((tmp_path / "surface.json").read_text())
     assert report == json.loads(capsys.readouterr().out)
     assert report["flipped"] is True
+    assert report["concave"] == [list(side.place)]
     assert report["hints"] == [
         {"row": 3, "column": 3, "slant": 20.0, "tilt": 90.0},
         {"row": 1, "column": 4, "slant": 30.5, "tilt": -45.0},
@@ -63,6 +65,8 @@ def test_a_surface_is_flipped_and_hinted(saved, tmp_path, capsys):
         ("--hint 1.5,2,3,4", "as in 12,30,45,90"),
         ("--hint 3,3,nan,4", "0 to less than 90"),
         ("--hint 0,0,30,90", "mask"),
+        ("--concave 3", "as in 120,80.5"),
+        ("--concave -9,nan", "outside the mask"),
         ("--hint 3,3,95,90", "90"),
         ("--side 100000", "on its longer side; give 1 to"),
         ("--underlay nothing.svg", "cannot be read"),

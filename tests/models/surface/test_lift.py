@@ -47,7 +47,32 @@ def test_a_hint_chooses_among_surfaces_of_the_same_crosses():
     true, field = exact("wave_sheet", 16)
     loose, settled = cf.surface(field), cf.surface(field, [middle(true)])
     assert apart(settled.normals, true.normals).mean() < 2
-    assert [len(lifted.freedom) for lifted in (loose, settled)] == [1, 0]
+    assert [choice.kind for choice in loose.freedom] == ["side", "depth"]
+    assert settled.freedom == ()
+
+
+@for_each("name", ["tilted_cylinder", "cone", "spheroid", "saddle"])
+def test_depth_is_open_where_rulings_are_straight(name):
+    kinds = [choice.kind for choice in cf.surface(surface_field(cf.sample(name, 24))).freedom]
+    assert ("depth" in kinds) == (name in {"tilted_cylinder", "cone"})
+
+
+@pytest.mark.skipif(not KNOWN.is_dir(), reason="needs the drawings in ../shared/known_surfaces")
+def test_the_depth_of_a_lamp_shade_is_open():
+    lifted = cf.surface(surface_field(cf.read_sketch(KNOWN / "lampshade.clean.svg", size=48)))
+    assert [choice.kind for choice in lifted.freedom] == ["side", "depth"]
+
+
+def test_a_part_is_made_concave_at_a_place():
+    _, field = exact("spheroid", 12)
+    plain = cf.surface(field)
+    (side,) = plain.freedom
+    for flip in (False, True):
+        bowl = cf.surface(field, flip=flip, concave=[side.place])
+        assert bowl.heights == pytest.approx(-plain.heights, nan_ok=True)
+        assert bowl.freedom == ()
+    with pytest.raises(cf.InputError, match=r"\(-1, 2\) lies outside the mask of spheroid"):
+        cf.surface(field, concave=[(-1, 2)])
 
 
 def test_a_hint_and_flip_choose_the_side():
