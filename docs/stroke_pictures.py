@@ -137,7 +137,7 @@ PAIRS: Final[dict[str, tuple[Case, Case]]] = {
             "straight lines: flat",
             BODY + line([(-55, 10), (58, -12)], "red") + line([(-10, -75), (12, 75)], "red"),
         ),
-        Case("bent lines: round", BODY + parallels(-20) + meridians(-30)),
+        Case("bent lines: round", BODY + parallels(-25, 20) + meridians(-30, 25)),
     ),
     "close": (Case("open outline", line(outline()[:-40]) + BOTH), Case("closed outline", BODY + BOTH)),
     "scribble": (
