@@ -198,7 +198,7 @@ class _Prover:
     def _bound_by_charges(self) -> str:
         """Bound the energy by charges where a part has no stroke; the reason why no level follows.
 
-        It is due at the beginning and for each better field, because that excludes more.
+        It is due at the beginning and, while levels prove less, for better fields, which exclude more.
         """
         ends, quick, many = self.ends, self.rows is None, self.instance.domain.size > checker.MOST_DENSE
         free, expected = len(self.energy.pins) > 0, _LOOK * self.instance.domain.size
@@ -208,9 +208,12 @@ class _Prover:
         if quick and not free and self._reason_against_levels():
             return ""
         self.rows, clock = self.rows or self._prepare(), ends.deadline.clock
-        later = _CHARGES * ends.deadline.left() if math.isfinite(ends.deadline.left()) else 0.0
-        while free and self.least < self.charged and (quick or not ends.is_over(later + self.look)):
-            begin = clock()
+        free &= self.charges >= self.proven.bound
+        while free and self.least < self.charged:
+            begin, left = clock(), ends.deadline.left()
+            later = _CHARGES * left if math.isfinite(left) else 0.0
+            if not quick and ends.is_over(later + self.look):
+                break
             chain, rows = self._begin_chain()
             took = clock() - begin
             ahead = took if quick else max(later, self.proven.seconds)
