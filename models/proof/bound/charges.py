@@ -50,6 +50,7 @@ _ROUNDS: Final = 12  # of a stage
 _STEPS: Final = 300  # of gradients for a potential
 _HALVINGS: Final = 60  # of the range of a multiplier
 _GAIN: Final = 1e-4  # relative: by which another round, or stage, has to raise the bound
+_SHARE: Final = 0.02  # of the gap: the same for another round
 
 
 def charge_arrays(
@@ -131,7 +132,7 @@ class _Stages:
                 parts = zip(STAGE_PARTS.items(), (*most, potential, price, start, cell, weight), strict=True)
                 arrays = {name: array.astype(kind) for (name, kind), array in parts}
                 remaining = clouds.remaining(bound, added, kind, threshold)
-            if bound < best + _GAIN * threshold or is_over():
+            if bound < best + max(_GAIN * threshold, _SHARE * (threshold - best)) or is_over():
                 break
             best = bound
             shares, potential = self._better_potential(clouds, kind, shares, is_over)
