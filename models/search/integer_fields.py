@@ -11,12 +11,14 @@ from typing import Final
 from ..field.field import CrossField
 from ..instance.domain import Ints
 from ..instance.instance import Instance
+from ..instance.mesh import Mesh
 from ..instance.sparse_systems import SimilarSystems
 from ..orthogonal.energy import MOST_DENSE, OrthogonalEnergy, field_of, integers_of
 from ..orthogonal.greedy import round_greedily
 from ..processes.deadline import IsOver
 from ..smooth.polyvector import power_field
 from .box_qp import FreeField, fit_in_box
+from .charge_search import move_charges
 from .improvement import settle
 
 _STEPS: Final = 30  # of the power field, where it is the first field
@@ -41,11 +43,24 @@ def first_integer_field(instance: Instance, is_over: IsOver) -> CrossField:
 def starting_integers(
     instance: Instance, energy: OrthogonalEnergy, start: CrossField | None, is_over: IsOver
 ) -> list[Ints]:
-    """Integers of the power field, the greedy field and a given one, after descent."""
+    """Integers of the power field, the greedy field and a given one, after descent.
+
+    On closed surfaces without handles or strokes, also the lowest of them after moves of charges.
+    """
     starts = [energy.nearest(power_field(instance).alpha), round_greedily(energy, is_over)]
     if start is not None:
         starts.append(integers_of(start))
-    return [energy.descend(z, is_over) for z in starts]
+    starts = [energy.descend(z, is_over) for z in starts]
+    if energy.size <= MOST_DENSE and energy.sums is None and _are_spheres(instance, energy):
+        lowest = min(starts, key=energy.least_total)
+        starts.append(move_charges(energy, instance.domain.rings, lowest, is_over))
+    return starts
+
+
+def _are_spheres(instance: Instance, energy: OrthogonalEnergy) -> bool:
+    """Whether all parts of a domain are closed and have neither handles nor strokes."""
+    domain, free = instance.domain, not len(instance.theta)
+    return isinstance(domain, Mesh) and free and domain.euler_characteristic == 2 * len(energy.pins)
 
 
 def have_energies_of_fields(instance: Instance) -> bool:

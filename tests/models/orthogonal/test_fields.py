@@ -9,7 +9,7 @@ from crossfield.models.orthogonal.greedy import find_forest_rows, round_greedily
 from crossfield.models.search import integer_search as search_module
 from crossfield.models.search.integer_search import IntegerSearch
 from meshes import box, flat_sheet, icosahedron, mesh_of, on_directions, on_edges, tetrahedron, torus
-from small_meshes import random_hull, random_mesh, strokeless, try_all_integers
+from small_meshes import form_of_charges, random_hull, random_mesh, strokeless, try_all_integers
 
 FINDERS = {
     "greedy": cf.greedy_field,
@@ -161,6 +161,18 @@ def test_the_integers_of_a_round_stay_while_the_search_goes_on():
     best, total = hunt.best.p, hunt.best.energy
     hunt.explore(lambda: False)
     assert energy.least_total(best) == pytest.approx(total, rel=1e-12)
+
+
+@pytest.mark.parametrize("seed, stretch", [(3, (1, 1, 1)), (5, (1, 1, 3))])
+def test_a_search_on_a_closed_surface_begins_where_no_charge_can_be_moved(seed, stretch):
+    mesh = random_hull(seed, 200, stretch)
+    field = cf.search(strokeless(mesh), rounds=0).field
+    form, turns, _ = form_of_charges(mesh)
+    charge = -turns
+    charge[field.singularities.vertex] += 4 * field.singularities.index
+    assert charge @ form @ charge == pytest.approx(field.energy().total)
+    potential, own = 2 * form @ charge, np.diagonal(form)
+    assert (own + own[:, None] - 2 * form + potential - potential[:, None]).min() > -1e-7
 
 
 def on_a_row(weight):

@@ -122,7 +122,7 @@ def test_a_check_without_memory_gives_its_reason_and_is_not_repeated(tmp_path):
                 used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
                 resource.setrlimit(resource.RLIMIT_AS, (used + 2**20, resource.RLIM_INFINITY))
 
-        instance = replace(cf.sample("mouse", 24), orthogonal=True)
+        instance = replace(cf.sample("mouse", 40), orthogonal=True)
         proof = cf.prove(instance, jobs=1, progress=leave_no_memory, work=1)
         resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
         print(len(checks), proof.bound, len(proof.levels), proof.energy == proof.field.energy().total)
