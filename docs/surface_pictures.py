@@ -89,7 +89,7 @@ def _view(row: Row) -> View:
 def _cells(row: Row, view: View) -> list[NDArray[np.uint8]]:
     """The pictures of a row, uint8 (h, w, 4) each, in a view of the grid."""
     instance = row.surface.instance
-    drawing = drawing_of(instance)
+    drawing = drawing_of(instance, instance.name if row.truth is None else None)
     outline = find_outline(instance, drawing) if row.truth is None else None
     shaded = raster(instance, row.surface.normals, view, outline=outline)
     faint = to_eight_bit(np.ones((*shaded.opacity.shape, 4)) * (0.94, 0.94, 0.94, 1.0))

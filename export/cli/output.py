@@ -149,6 +149,7 @@ def show_report(report: Report, folder: Path) -> None:
         doubts = "; ".join(report.surface.doubts)
         layers = f"surface, as layers for the drawing: {folder / 'shaded.png'} and normals.png"
         print_line(_wrap(f"no shaded surface: {doubts}; crossfield shade draws it" if doubts else layers))
+        _show_choices(report.surface)
     print_line(f"  {report.files} solver files: {folder / 'models'}; all results: {folder / 'index.html'}")
     print_line(f"  {report.seconds:.1f} s in all")
     for candidate in report.candidates:
@@ -223,13 +224,18 @@ def show_surface(surface: Surface, facts: dict[str, Any], folder: Path) -> None:
     )
     for name, text in facts["support"].items():
         print_line(_wrap(f"{name}: {text}"))
-    for choice in surface.freedom:
-        print_line(_wrap(f"undetermined: {choice}; choose, for example with {choice.option}"))
+    _show_choices(surface)
     for doubt in surface.doubts:
         print_notice(f"in doubt: {doubt}")
     pictures = facts["pictures"]
     print_line(_wrap(f"pictures show {pictures['show']}, {pictures['width']} x {pictures['height']} pixels"))
     print_line(f"pictures, heights, mesh: {folder}")
+
+
+def _show_choices(surface: Surface) -> None:
+    """Print what crosses leave undetermined, with the options of `shade` that decide it."""
+    for choice in surface.freedom:
+        print_line(_wrap(f"undetermined: {choice}; choose, for example with shade {choice.option}"))
 
 
 def show_facts(title: str, facts: dict[str, Any]) -> None:
