@@ -1,6 +1,6 @@
 """Pictures of the page of `crossfield studio`, for docs/tutorials/studio.md.
 
-`python docs/studio_pictures.py` draws docs/pictures/studio_page.png and studio_doubts.png anew. It needs
+`python docs/studio_pictures.py` draws docs/pictures/studio_page.png and studio_pipe.png anew. It needs
 Chromium, its driver and Selenium.
 """
 
@@ -63,7 +63,7 @@ def main() -> None:
     """Draw both pictures."""
     with page_of("bottle") as page:
         write_shot(page, "studio_page.png", "input[value=lines]", "input[value=matcap]")
-        write_shot(page, "studio_doubts.png", *PIPE.split("|"))
+        write_shot(page, "studio_pipe.png", *PIPE.split("|"))
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ from pathlib import Path
 PAGE = Path(__file__).resolve().parents[1] / "performance.md"
 BENCHMARKS = {
     "closed": "proofs on closed surfaces, for docs/notebooks/mesh.md",
+    "doubts": "doubts about drawings whose surfaces are known",
     "start": "CPU seconds of short commands",
     "studio": "the answer of the studio to a stroke",
     "surfaces": "errors of surfaces by their fields",

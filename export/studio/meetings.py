@@ -51,7 +51,7 @@ def _resample(line: Floats) -> Floats:
 def find_meetings(lines: list[Floats], *, at_ends: bool = True) -> tuple[Ints, Floats]:
     """Pairs of lines, as from `lines_of`, that come near each other at a clear angle.
 
-    Returns their numbers (k, 2), the lower one first, and the middle of the places where they meet (k, 2).
+    Returns their numbers (k, 2), the lower one first, and the places (k, 2) where they are nearest.
     at_ends: whether places count that are near an end of both.
     """
     if not lines:
@@ -66,10 +66,11 @@ def find_meetings(lines: list[Floats], *, at_ends: bool = True) -> tuple[Ints, F
     first, second = near.T
     apart = line_difference(direction[first], direction[second]) > _APART
     near = near[apart & (owner[first] != owner[second]) & (inner[first] | inner[second])]
+    closest = np.argsort(np.hypot(*np.diff(points[near], axis=1)[:, 0].T), kind="stable")
+    near = near[closest]
     low, high = np.sort(owner[near].astype(np.int64), axis=1).T
-    key, at, count = np.unique(low * len(lines) + high, return_inverse=True, return_counts=True)
-    places = [np.bincount(at, side, len(key)) / count for side in points[near].mean(axis=1).T]
-    return np.stack(np.divmod(key, len(lines)), axis=1), np.stack(places, axis=1)
+    key, first = np.unique(low * len(lines) + high, return_index=True)
+    return np.stack(np.divmod(key, len(lines)), axis=1), points[near[first]].mean(axis=1)
 
 
 def _directions(line: Floats) -> Floats:

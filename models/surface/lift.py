@@ -108,7 +108,7 @@ def surface(
     lifted = Surface(field, heights, confidence_of(field, off), (), tuple(freedom))
     slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
     late = ("time was over before it had settled",) if is_over() else ()
-    return replace(lifted, doubts=(*doubts_of(field, off, slant), *late))
+    return replace(lifted, doubts=(*doubts_of(off, slant), *late))
 
 
 def _solve_part(

@@ -15,8 +15,7 @@ from .freedom import find_deepest, place_of
 from .stencils import Crosses, Stencils, corners_of_blocks
 
 OFF: Final = np.radians(10)  # lines whose angle in space deviates more from a right angle do not fit
-UNFIT: Final = 0.25  # share of misfit crosses from which a surface is doubted (docs/surface.md)
-SPOTS: Final = 4  # singular spots that a surface may show: an ellipsoid has four umbilics
+UNFIT: Final = 0.3  # share of misfit crosses from which a surface is doubted (docs/surface.md)
 FLAT: Final = np.radians(10)  # mean slant below which a surface is called flat
 
 _PLAIN: Final = Weights(even=0.0, facing=0.0)
@@ -38,14 +37,13 @@ def confidence_of(field: CrossField, off: Floats) -> Floats:
     return np.where(singular[field.instance.mask], 0.0, 1 / (1 + (off / OFF) ** 2))
 
 
-def doubts_of(field: CrossField, off: Floats, slant: Floats) -> tuple[str, ...]:
+def doubts_of(off: Floats, slant: Floats) -> tuple[str, ...]:
     """Sentences with reasons not to trust a surface. slant: of its normals, radians (n,)."""
-    unfit, spots = float(np.mean(off > OFF)), len(field.singularities.index)
+    unfit = float(np.mean(off > OFF))
     conditions = {
         f"{unfit:.0%} of the crosses are more than {np.degrees(OFF):g} degrees off right angles on it: "
-        "no one surface has all these curvature lines. Probably some strokes are not curvature lines; "
-        "otherwise hidden lines are drawn": unfit > UNFIT,
-        f"the crosses turn round {spots} singular spots, more than a smooth surface shows": spots > SPOTS,
+        "no one surface has all these curvature lines. Lines are missing, or some strokes are not curvature "
+        "lines or are hidden": unfit > UNFIT,
         f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
         "lines that cross at right angles everywhere do not determine a shape": slant.mean() < FLAT,
     }

@@ -1,10 +1,10 @@
 // The right picture: the surface as normal map, in the light of a lamp, or in the material of a glazed ball.
 
-import { colours, gridPicture, putInk } from "./drawing.js";
+import { colours, putInk } from "./drawing.js";
 
 const AMBIENT = 0.04, VIEWER = 0.10, LAMP = 0.95, FILL = 0.08, CLAY = [0.80, 0.77, 0.73]; // as export/shading/colours.py
 export const LAMP_AT = { azimuth: 130 * Math.PI / 180, elevation: 38 * Math.PI / 180 };
-const LEVELS = 8192, FINE = 32767, DOUBT = 64; // of 255: angles in space that are 17 degrees and more off
+const LEVELS = 8192, FINE = 32767;
 const SCREEN = Uint8ClampedArray.from({ length: LEVELS + 1 }, (_, k) => {
   const light = k / LEVELS;
   return 255 * (light <= 0.0031308 ? 12.92 * light : 1.055 * light ** (1 / 2.4) - 0.055);
@@ -53,15 +53,9 @@ export const tipOf = ({ x, y, slant, tilt }, reach) => {
   return [x + long * Math.cos(angle), y - long * Math.sin(angle)];
 };
 
-const doubtMap = surface => surface.doubtful ??= gridPicture(surface.rows, surface.columns, k => {
-  const n = surface.number[k];
-  return n < 0 || surface.confidence[n] >= DOUBT ? [0, 0, 0, 0] : [235, 120, 0, 130 - surface.confidence[n]];
-});
-
-export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strokes, hints, live, spot }) {
+export function paintSurface(view, { surface, frame, kind, lamp, strokes, hints, live, spot }) {
   const context = view.begin(view.canvas);
   if (!frame) return;
-  const wide = frame.pixel * frame.columns, high = frame.pixel * frame.rows;
   if (surface) {
     const key = `${kind} ${kind === "shaded" ? `${lamp.azimuth} ${lamp.elevation}` : ""}`;
     if (surface.shown?.key !== key) {
@@ -72,9 +66,6 @@ export function paintSurface(view, { surface, frame, kind, lamp, doubtful, strok
     }
     context.imageSmoothingQuality = "high";
     context.drawImage(surface.shown.picture, ...surface.box);
-    context.globalCompositeOperation = "source-atop"; // only on the surface
-    if (doubtful) context.drawImage(doubtMap(surface), frame.x, frame.y, wide, high);
-    context.globalCompositeOperation = "source-over";
   }
   const reach = reachOf(frame), thin = 1 / view.scale;
   context.globalAlpha = 0.7;

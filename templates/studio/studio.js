@@ -31,7 +31,7 @@ function refresh(base = true) {
     if (dirty) paintBase(left, { ...seen, picture: picture(), opacity: Number($("#opacity").value) });
     dirty = false;
     paint(left, seen);
-    paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, doubtful: $("#doubtful").checked && isDetermined(), strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
+    paintSurface(right, { ...state, frame: state.surface?.frame ?? state.field?.frame, strokes: $("#ink").checked ? state.doc.strokes : [], hints: state.doc.hints, live: state.arrow });
   });
 }
 
@@ -178,7 +178,7 @@ function take(found) {
     numbers(found); proceed(found.next);
   } else if (found.stage === "lines") { state.lines = found.families; times.lines = seconds(); }
   else if (found.stage === "surface") {
-    state.surface = { ...found, frame: state.field.frame, normals: decoded.shorts(found.normals), opacity: decoded.bytes(found.opacity), confidence: decoded.bytes(found.confidence), number: numbered(decoded.bytes(found.mask)) };
+    state.surface = { ...found, frame: state.field.frame, normals: decoded.shorts(found.normals), opacity: decoded.bytes(found.opacity) };
     times.surface = seconds(); doubts();
   }
   $("#times").textContent = Object.entries({ ...times }).filter(([, value]) => value).map(([key, value]) => `${key} ${value}`).join(" · ");
@@ -488,7 +488,7 @@ for (const [name, read_] of Object.entries(settings)) {
   $(`#${name}`).addEventListener("change", () => commit(read_()));
 }
 $("#brush").addEventListener("input", controls); $("#opacity").addEventListener("input", () => refresh());
-for (const name of ["#doubtful", "#ink"]) $(name).addEventListener("change", () => refresh(false));
+$("#ink").addEventListener("change", () => refresh(false));
 all("input[name=field]").forEach(each => each.addEventListener("change", () => { state.mode = each.value; refresh(); if (each.value === "lines" && !state.lines) request(); }));
 all("input[name=surface]").forEach(each => each.addEventListener("change", () => { state.kind = each.value; refresh(false); }));
 

@@ -174,8 +174,7 @@ def test_the_preview_is_the_picture_that_shade_writes(empty, tmp_path, content):
     path = tmp_path / ("drawing.json" if content is PEBBLE else "drawing.svg")
     browser = load(empty, path, content)
     slide(browser, "#size", 24)
-    for box in ("#doubtful", "#ink"):
-        find(browser, box).click()
+    find(browser, "#ink").click()
     browser.execute_script(SHOWN)
     drag(settled(browser), [(200, 300), (230, 270)], "#surface")
     if content is PEBBLE:

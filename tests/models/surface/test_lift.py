@@ -156,8 +156,7 @@ def test_crosses_of_no_surface_are_doubted():
     angle = np.random.default_rng(0).uniform(0, np.pi, (2, instance.grid.size))
     lifted = cf.surface(cf.CrossField.from_lines(instance, *angle))
     (unfit,) = (doubt for doubt in lifted.doubts if "no one surface" in doubt)
-    assert 0 < unfit.index("not curvature lines") < unfit.index("hidden lines")
-    assert any("singular spots" in doubt for doubt in lifted.doubts)
+    assert 0 < unfit.index("missing") < unfit.index("not curvature lines") < unfit.index("hidden")
     assert lifted.confidence.mean() < 0.7
 
 
