@@ -631,7 +631,7 @@ def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
         normal[rows.second[at], np.arange(len(at))] = -np.sign(r[at])
         free = ~rows.fixed
         pull = np.maximum(np.linalg.lstsq(normal[free], -slope[free], rcond=None)[0], 0.0) if len(at) else at
-        slope += normal @ pull
+        slope = slope + normal @ pull  # of no rows, sums are whole numbers
         away, reach = np.abs(angle - rows.centre) + np.where(rows.fixed, 0.0, np.pi), rows.reach_of(angle)
         size = np.sum(rows.weight * (1 + r * r) * (1 + reach)) / 4 + pull @ (1 + reach[at])
         total = math.fsum(rows.weight * r * r) + math.fsum(pull * (np.abs(r[at]) - QUARTER - RELATIVE))
