@@ -262,6 +262,8 @@ class _Prover:
                 self._search(_SEARCH * self.ends.deadline.left())
             while True:
                 if reason := self._bound_by_charges():
+                    if reason == "time":
+                        self._reason_against_levels()  # names what is left out
                     return reason
                 begin = self.ends.deadline.clock() - self.searched
                 reason = self._go_through_levels()
@@ -284,11 +286,13 @@ class _Prover:
                 f"the coarsest level has {costs} pairs of labels, and at most {_MOST_COSTS} fit in memory"
             )
             return reason or "labels"
-        if not small and reason in ("", "time") and self.ends.is_over(_SECONDS * costs):
-            seconds = f"{_SECONDS * costs:.0f} s"
-            self._leave_out(f"the coarsest level takes about {seconds}, which needs a longer time limit")
+        needed = small and not self.proven.bound
+        if not needed and reason in ("", "time") and self.ends.is_over(_SECONDS * costs):
+            if not self.proven.levels:
+                seconds = f"{_SECONDS * costs:.0f} s"
+                self._leave_out(f"the coarsest level takes about {seconds}, which needs a longer time limit")
             return "time"
-        return "" if reason == "time" and small and not self.proven.bound else reason
+        return "" if reason == "time" and needed else reason
 
     def _go_through_levels(self) -> str:
         """Go through the levels round the best field; the reason of the end, empty for a better field."""

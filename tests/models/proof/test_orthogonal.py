@@ -172,6 +172,9 @@ def test_without_time_for_charges_and_levels_many_faces_have_a_field_and_the_rea
     proof = cf.prove(strokeless(random_hull(0, 3100)), limits=cf.Limits(1e-9))
     assert (proof.ended, proof.levels, proof.has_bound) == ("time", (), False)
     assert re.fullmatch("charges take about 1 s.*; the coarsest level takes about 5 s.*", proof.reason)
+    proof = cf.prove(strokeless(random_hull(1, 300)), limits=cf.Limits(1e-9))
+    assert 0 < proof.bound < proof.energy
+    assert proof.reason.startswith("the coarsest level takes about")
 
 
 def test_a_bound_of_charges_has_the_reason_why_no_level_follows(monkeypatch):
