@@ -12,7 +12,6 @@ import numpy as np
 import places
 import pytest
 from answers import HIGHS_STATES_BOUNDS
-from answers import problem as tiny
 from crossfield.export.cli.app import invoke, read_command
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.grammar import AGREEMENT
@@ -214,15 +213,6 @@ def test_values_of_an_ampl_file_without_a_claim_count_if_they_are_feasible(
         wrong = {200: values is point and "its point is feasible", 300: "is bounded below"}.get(code)
         assert facts["status"] == ("unknown" if wrong else status)
         assert (wrong or "not a solution") in complaint
-
-
-@pytest.mark.parametrize(
-    "file", ["cplex-22.2.0.1_other_unbounded.sol", "baron-26.5.27_other_unbounded_res.lst"]
-)
-def test_an_unbounded_answer_of_any_program_is_unknown(file):
-    answer = cf.read_solution(places.SOLUTIONS / "tiny" / file, tiny("milp"), identified=True)
-    assert (answer.claimed, answer.status) == ("unbounded", "unknown")
-    assert "bounded below" in answer.doubt
 
 
 # against the gap

@@ -49,15 +49,6 @@ def test_export_and_solve_fix_the_same_jumps_and_either_manifest_reads_the_answe
         assert cf.read_field(tmp_path / f"{number}.npz").energy().total == pytest.approx(expected)
 
 
-def test_a_solution_for_other_jumps_is_refused(solved, ring, tmp_path, capsys):
-    """A field of energy 15.5 came of an optimum of 1e-6: columns alike, fixed jumps different."""
-    problem = cf.formulate(ring, "qp-fixed", p=cf.greedy_field(ring).p)
-    other = cf.write(problem, tmp_path / "files", formats=["nl"])
-    assert read(only(solved / "solved", "*.ipopt.sol"), other.path, tmp_path / "field.npz") == 1
-    assert "is of another problem" in capsys.readouterr().err
-    assert not (tmp_path / "field.npz").exists()
-
-
 def test_solve_keeps_what_export_wrote_beside_it(solved, tmp_path):
     """A manifest keeps the other files of the same problem, and drops those of another."""
     folder = tmp_path / "both"

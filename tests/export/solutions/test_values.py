@@ -1,6 +1,5 @@
 """From values in files to checked points: numbers, names, positions, products, rounding."""
 
-import random
 import struct
 import tracemalloc
 from itertools import product
@@ -9,11 +8,8 @@ import crossfield as cf
 import numpy as np
 import places
 import pytest
-from crossfield.export.solutions.readers import grammar
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
-from crossfield.export.solutions.readers.grammar import EntryForm
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
-from crossfield.export.solutions.readers.text import read_entries, values_by_name, values_in_order
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from instance_kinds import kind
@@ -81,20 +77,6 @@ def test_two_faults_on_neighbouring_lines_do_not_make_up_for_each_other():
         parse_raw(highs(["a 1", "b 2 c", "3"]))
     with pytest.raises(cf.SolutionError, match="line 12: 2 words stand where 1 should"):
         parse_raw(ampl(values=("1 2", "")))
-
-
-def test_columns_of_text_larger_than_a_piece(monkeypatch):
-    rng = random.Random(5)
-    values = [rng.gauss(0, 1) * 10 ** rng.randint(-20, 20) for _ in range(500)]
-    names = ["n" * rng.randint(1, 15) + str(at) for at in range(500)]
-    data = "".join(f"{name} {value!r}\n" for name, value in zip(names, values, strict=True)).encode()
-    column = "".join(f"{value!r}\n" for value in values).encode()
-    for size in (1, 30, 64, 1000, len(data) - 1, len(data), len(data) + 1):
-        monkeypatch.setattr(grammar, "PIECE", size)
-        entries = read_entries(data, 0, EntryForm("name value"))
-        assert entries.names.tolist() == [name.encode() for name in names]
-        assert entries.values.tolist() == values
-        assert read_entries(b"7\n" + column, 2, EntryForm("value")).values.tolist() == values
 
 
 # layouts of AMPL
@@ -181,47 +163,6 @@ def test_values_that_are_not_finite_are_not_written(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-# by name and by position
-
-
-def by_name(names, data):
-    return values_by_name(np.array(names, dtype="S15"), parse_raw(data))
-
-
-def test_missing_names_are_zero_only_where_zeros_are_omitted():
-    values, missing, _ = by_name([b"x", b"y", b"b"], highs(["x 1", "y 2"]))
-    assert (np.isnan(values).tolist(), missing) == ([False, False, True], 1)
-    values, missing, _ = by_name([b"x", b"y", b"b"], highs(["x 1 0", "y 2 1"], count=-2))
-    assert (values.tolist(), missing) == ([1, 2, 0], 0)
-    values, missing, _ = by_name([b"x", b"y", b"b"], highs([]))
-    assert (values.tolist(), missing, parse_raw(highs([])).has_point) == ([0, 0, 0], 0, True)
-
-
-def test_columns_that_readers_of_models_add_are_no_strangers():
-    added = ["ONE", "Constant", "Rgc1", "MPS_Rgc1", "nlobjvar", "quadobjvar", "qmatrixvar", "objvar"]
-    data = highs([f"{name} 1" for name in [*added, "x", "One", "objvars", "aRg"]])
-    values, missing, unknown = by_name([b"x"], data)
-    assert (values.tolist(), missing, unknown) == ([1], 0, 2)
-    assert by_name([b"ONE", b"x"], highs(["x 2", "ONE 1"])).values.tolist() == [1, 2]
-
-
-def test_a_name_with_two_values_is_refused():
-    assert by_name([b"y", b"x"], highs(["x 1", "y 2", "x 1.0"])).values.tolist() == [2, 1]
-    with pytest.raises(cf.SolutionError, match=r"x has two values, 1\.0 and 3\.0"):
-        by_name([b"y", b"x"], highs(["x 1", "y 2", "x 3"]))
-
-
-def test_values_in_order_belong_to_a_problem_of_the_same_size():
-    raw = read_raw(places.SOLUTIONS / "scip-10.0_optimal.sol")
-    assert values_in_order(5, 2, raw).tolist() == [10, -9.7, 1, 0, 1]
-    for columns, rows in ((4, 2), (5, 3), (3, 2)):
-        words = f"of 5 columns and 2 rows, the problem has {columns} columns and {rows} rows"
-        with pytest.raises(cf.SolutionError, match=words):
-            values_in_order(columns, rows, raw)
-    with pytest.raises(cf.SolutionError, match=r"no point in it .*infeasible"):
-        values_in_order(5, 3, read_raw(places.SOLUTIONS / "scip-10.0_infeasible.sol"))
-
-
 # points
 
 
@@ -236,21 +177,6 @@ def read_list(folder, names, values, problem=MILP):
     lines = (f"{name} {float(value)!r}\n" for name, value in zip(names, values, strict=True))
     (folder / "x.sol").write_text("".join(lines))
     return cf.read_solution(folder / "x.sol", problem)
-
-
-@pytest.mark.parametrize("name", ["minlp-quartic", "minlp-cubic"])
-def test_a_file_with_lifted_products_is_mapped_onto_the_lifted_problem(tmp_path, name):
-    problem = cf.formulate(FIELD.instance, name)
-    held = problem.lifted
-    names, point = held.to_arrays().column_names, held.point(FIELD)
-    solution = read_list(tmp_path, names, point, problem)
-    assert solution.problem.n_columns == held.n_columns == problem.n_columns + len(FIELD.p)
-    assert solution.objective == pytest.approx(problem.objective_value(problem.point(FIELD)), rel=1e-12)
-    assert (solution.unknown, solution.field.p.tolist()) == (0, FIELD.p.tolist())
-    point[held.blocks["z"].slice] += 0.25  # a product that is none
-    cheated = read_list(tmp_path, names, point, problem)
-    assert cheated.violation.rows == pytest.approx(0.25)
-    assert cheated.violation.worst_family in {"c27", "c28"}
 
 
 def test_integers_near_a_whole_number_are_rounded_and_other_values_kept(tmp_path):
@@ -308,6 +234,13 @@ def test_other_spellings_of_names_are_read(rename, tmp_path):
     solution = read_list(tmp_path, map(rename, NAMES), POINT)
     assert (solution.status, solution.unknown) == ("feasible", 0)
     assert solution.point.tolist() == POINT.tolist()
+
+
+def test_columns_that_readers_of_models_add_are_no_strangers(tmp_path):
+    added = ["ONE", "Constant", "Rgc1", "MPS_Rgc1", "nlobjvar", "quadobjvar", "qmatrixvar", "objvar"]
+    more = [*added, "One", "objvars", "aRg"]
+    solution = read_list(tmp_path, [*more, *NAMES], [*np.ones(len(more)), *POINT])
+    assert (solution.unknown, solution.point.tolist()) == (2, POINT.tolist())
 
 
 def test_two_spellings_of_a_name_are_refused_if_their_values_differ(tmp_path):
