@@ -102,13 +102,6 @@ def test_the_certificate_of_a_mesh_proves_its_entry():
     assert entry.certificate.bound == pytest.approx(entry.bound, rel=1e-12)
 
 
-def test_an_unknown_entry_suggests_near_names():
-    with pytest.raises(cf.InputError, match=r"has no entry 'cf_skew_n008_mlip'; is it .*cf_skew_n008_milp"):
-        cf.entries("cf_skew_n008_exact", "cf_skew_n008_mlip")
-    with pytest.raises(cf.InputError, match=r"crossfield\.entries\(\) lists them"):
-        cf.entries("x")
-
-
 # The command
 
 

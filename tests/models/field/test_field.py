@@ -5,42 +5,26 @@ import numpy as np
 import pytest
 from crossfield.models.field.field import field_in_windows
 from crossfield.models.instance.angles import HALF, QUARTER
-from exhaustive import assert_feasible, random_field, random_instance
+from exhaustive import random_field, random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from loops import for_each
+from instance_kinds import grid
 
 SEEDS = st.integers(0, 2**32 - 1)
-
-
-def pixels(mask, theta, gauge="strokes", skew_coefficient=1e-6):
-    """An instance whose pixels [row, column] in theta (a dict, degrees) are strokes of weight 1."""
-    places = sorted(theta)
-    angles = np.radians([theta[place] for place in places])
-    return cf.Instance.on_pixels(
-        "hand",
-        np.array(mask, bool),
-        places,
-        angles,
-        np.ones(len(places)),
-        gauge=gauge,
-        skew_coefficient=skew_coefficient,
-    )
 
 
 def test_degenerate_where_lines_are_closer_than_five_degrees():
     edge = np.radians(42.5)
     beta = [edge - 1e-9, edge + 1e-9, -QUARTER, 0]
-    field = cf.CrossField(pixels([[1, 1, 1, 1]], {(0, 0): 0}), np.zeros(4), beta, [0, 0, 0])
+    field = cf.CrossField(grid("/###", 0.0), np.zeros(4), beta, [0, 0, 0])
     assert field.degenerate.tolist() == [False, True, True, False]
     assert np.degrees(field.angle_between) == pytest.approx([5, 5, 0, 90], abs=1e-6)
 
 
 def test_the_shape_of_a_field_is_what_vectors_say():
     rng = np.random.default_rng(1)
-    theta = {(row, column): 180 * rng.random() for row in range(6) for column in range(0, 6, 2)}
-    field = random_field(pixels(np.ones((6, 6)), theta), 1)
-    stroke = np.radians([theta[place] for place in sorted(theta)])
+    stroke = np.pi * rng.random(18)
+    field = random_field(grid(("/#" * 3 + " ") * 6, stroke), 1)
     at, (u, v) = field.instance.stroke_index, (field.u_angle, field.v_angle)
 
     def apart(one, other):
@@ -56,25 +40,8 @@ def test_the_shape_of_a_field_is_what_vectors_say():
 
 @pytest.mark.parametrize("skew", [22.5, -22.5])
 def test_45_degrees_are_not_narrow(skew):
-    field = cf.CrossField(pixels([[1, 1]], {(0, 0): 0}), [0.2, 0.2], np.radians([skew, skew]), [0])
+    field = cf.CrossField(grid("/#", 0.0), [0.2, 0.2], np.radians([skew, skew]), [0])
     assert field.shape.narrow_pixels == 0
-
-
-@for_each(
-    "alpha,beta,p,message",
-    [
-        ([0], [0, 0], [0], "alpha has shape (1,), but hand needs (2,)"),
-        ([0, 0], [[0, 0]], [0], "beta has shape (1, 2)"),
-        ([0, 0], [0, 0], [0, 0], "p has shape (2,), but hand needs (1,)"),
-        ([0, 0], [np.inf, 0], [0], "beta holds something other than angles"),
-        ([0, 0], [0, 0], [0.5], "p holds something other than whole numbers"),
-        ([0, 0], [0, 0], [2**32], "p holds something other than whole numbers"),
-    ],
-)
-def test_wrong_arrays_are_named(alpha, beta, p, message):
-    with pytest.raises(cf.InstanceError) as caught:
-        cf.CrossField(pixels([[1, 1]], {(0, 0): 0}), alpha, beta, p)
-    assert message in str(caught.value)
 
 
 @settings(max_examples=40)
@@ -109,15 +76,3 @@ def test_energies_do_not_depend_on_the_labels(seed, norm):
     assert back.energy().total == pytest.approx(field.energy().total, abs=1e-9)
     assert back.alpha == pytest.approx(field.alpha, abs=1e-9)
     assert back.beta == pytest.approx(field.beta, abs=1e-9)
-
-
-@settings(max_examples=40)
-@given(SEEDS, st.sampled_from(["strokes", "box"]))
-def test_relabelled_is_inside_every_bound(seed, gauge):
-    instance = random_instance(seed, gauge=gauge)
-    rng = np.random.default_rng(seed)
-    size, pairs = instance.grid.size, len(instance.grid.first)
-    field = field_in_windows(
-        instance, rng.uniform(-9, 9, size), rng.uniform(-2, 2, size), rng.integers(-9, 9, pairs)
-    )
-    assert_feasible(field)

@@ -7,7 +7,6 @@ from crossfield.models.instance.angles import HALF, line_difference
 from exhaustive import assert_feasible, random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from loops import for_each
 
 
 @given(seed=st.integers(0, 2**32 - 1), gauge=st.sampled_from(["strokes", "box"]))
@@ -47,20 +46,3 @@ def test_lines_that_are_one_make_a_cross_of_one_line():
     assert field.degenerate.all()
     assert field.angle_between == pytest.approx([0, 0], abs=1e-9)
     assert np.abs(field.residual_r) == pytest.approx([0], abs=1e-9)
-
-
-@for_each(
-    "u, message",
-    [
-        ([0.0], "u_angle has shape (1,), but two has 2 pixels"),
-        ([[0.0, 1.0]], "u_angle has shape (1, 2), but two has 2 pixels"),
-        ([0.0, np.nan], "u_angle of pixel 1 is nan, which is not an angle"),
-        ([2e6, 0.0], "u_angle of pixel 0 is 2000000.0, which is not an angle"),
-        (["a", "b"], "u_angle holds something other than numbers"),
-    ],
-)
-def test_what_is_no_angle_is_refused(u, message):
-    instance = cf.Instance.on_pixels("two", [[True, True]], [[0, 0]], [0.3], [1.0])
-    with pytest.raises(cf.InputError) as caught:
-        cf.CrossField.from_lines(instance, u, [0.0, 0.0])
-    assert message in str(caught.value)

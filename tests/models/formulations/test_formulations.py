@@ -163,40 +163,6 @@ def test_arrays_do_not_share_memory_with_the_problem():
     assert not (problem.lower == 7).any()
 
 
-@for_each(
-    "name, options, message",
-    [
-        ("milo", {}, "no formulation 'milo' .*; choose one of minlp-parity"),
-        ("MILP", {}, r"no formulation 'MILP' .*\(is it milp\?\)"),
-        ("quartc", {}, r"\(is it quartic\?\)"),
-        ("zzz", {}, "in short parity, quartic, cubic, bilin, bilin1, miqp, milp"),
-        ("milp-mccormick", {"norm": 1}, "no option 'norm'"),
-        ("minlp-cubic", {"facet": "printed"}, "minlp-cubic has no option facet"),
-        ("qp-fixed", {"relax": True}, "qp-fixed has no option relax"),
-        ("milp-mccormick", {"facet": "round"}, "no facet 'round'"),
-        ("milp-mccormick", {"p": [0, 0, 0]}, "milp-mccormick has the jumps as variables; leave p out"),
-        ("qp-fixed", {}, "qp-fixed takes the jumps of all pairs as data; give p=field.p"),
-        ("qp-fixed", {"p": [0]}, r"p has shape \(1,\), but the grid has 2 pairs"),
-        ("milp-cycle", {}, "orthogonal crosses only; make the instance with orthogonal"),
-        ("milp-cycle orthogonal", {"limits": True}, "milp-cycle has no option limits"),
-        ("miqp-cycle orthogonal box", {}, "the gauge box does not at strokes; choose the gauge strokes"),
-        ("miqp-orthogonal orthogonal box", {"limits": True}, "the gauge box does not at strokes; choose"),
-    ],
-)
-def test_names_and_options_that_do_not_fit_are_refused(name, options, message):
-    name, *words = name.split()
-    instance = cf.Instance.on_pixels(
-        "row", [[True] * 3], [[0, 0]], [0.3], [1.0], orthogonal="orthogonal" in words
-    )
-    with pytest.raises(cf.FormulationError, match=message):
-        cf.formulate(instance.with_gauge("box") if "box" in words else instance, name, **options)
-
-
-def test_cosines_are_not_lifted():
-    with pytest.raises(cf.FormulationError, match=r"minlp-parity has cosines.*; choose minlp-quartic"):
-        _ = cf.formulate(cf.sample("mouse", 4), "minlp-parity").lifted
-
-
 def test_a_formulation_in_the_place_of_a_method_is_named(tmp_path, capfd):
     assert invoke(["solve", "mouse", "--size", "4", "-m", "milp", "-o", str(tmp_path)]) == 2
     assert "milp is a formulation, not a method; write -f milp" in " ".join(capfd.readouterr().err.split())

@@ -370,23 +370,6 @@ def test_meshes_that_are_no_manifolds_are_named_with_their_faces(tmp_path, faces
     assert message in str(caught.value)
 
 
-@for_each(
-    "options",
-    [
-        {"sharp": -1},
-        {"merge": -1},
-        {"sharp": 181},
-        {"sharp_weight": 0},
-        {"weights": "cotan"},
-        {"boundary": 3},
-        {"gauge": "x"},
-    ],
-)
-def test_wrong_options_are_refused(tmp_path, options):
-    with pytest.raises(cf.CrossfieldError, match=next(iter(options))):
-        cf.read_mesh(write_obj(tmp_path / "a.obj", tetrahedron()), **options)
-
-
 def soup(mesh, noise=0.0):
     """The mesh with vertices of its own for each face, which differ by the noise."""
     corners = mesh.vertices[mesh.faces].reshape(-1, 3)

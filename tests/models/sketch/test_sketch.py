@@ -408,15 +408,6 @@ def test_bad_files_are_refused_in_one_line_that_names_them(name, tmp_path):
     assert "\n" not in str(caught.value)
 
 
-@for_each(
-    "path, message",
-    [("none.svg", "cannot be read: no such file"), (".", "is a directory"), ("\0", "cannot be read")],
-)
-def test_paths_of_no_file_are_refused(path, message):
-    with pytest.raises(cf.InputError, match=message):
-        cf.read_sketch(path)
-
-
 def test_a_grid_too_coarse_for_the_outline_is_refused():
     with pytest.raises(NoStrokeError, match="so coarse a grid; choose a larger size"):
         read(svg(TWO_COLOURS), 2)
