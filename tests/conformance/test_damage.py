@@ -173,7 +173,8 @@ def test_archives_that_readers_would_take_differently_are_refused(name, tmp_path
             path.write_bytes(forge(good))
             with pytest.raises(cf.InstanceError, match=path.name) as refusal:
                 read(path)
-            assert "\n" not in str(refusal.value)
+            assert str(refusal.value).isprintable()
+            assert len(str(refusal.value)) < len(str(tmp_path)) + 200
     for save in (np.savez, np.savez_compressed):
         path.write_bytes(of_numpy(good, save))
         assert getattr(read(path), "instance", read(path)).sha256 == PIXELS.instance.sha256

@@ -13,6 +13,7 @@ import gams_reader
 import numpy as np
 import pyomo.environ as pyo
 import pytest
+from cases import OPTIONS
 from crossfield.export.formats.gams import MODEL_TYPES
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.programs.casadi import read_nl
@@ -29,14 +30,7 @@ from oracles import by_asl
 from places import GOLDEN
 from pyomo.repn.plugins.nl_writer import NLWriter
 
-VALUES = {
-    "relax": [True],
-    "facet": ["printed"],
-    "stroke_norm": [1, 2],
-    "beta_norm": [1, 2],
-    "limits": [True],
-    "change": ["jumps fixed", "windows narrowed"],
-}
+VALUES = OPTIONS | {"change": ["jumps fixed", "windows narrowed"]}
 """Values of each option; `change` is one of the problem."""
 PLACES = [
     name

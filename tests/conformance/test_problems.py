@@ -7,6 +7,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
+from cases import OPTIONS
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solvers_table import SOLVERS, suitability_in_format
@@ -60,16 +61,6 @@ def least_weight(instance):
     return min(x for x in (*strokes, instance.skew_coefficient, *pairs, 1.0) if x > 0)
 
 
-CHOICES = {
-    "relax": [True],
-    "facet": ["printed"],
-    "stroke_norm": [1, 2],
-    "beta_norm": [1, 2],
-    "limits": [True],
-}
-"""Values of the options of formulations."""
-
-
 def field_with_any_jumps(instance):
     """Angles anywhere in their windows, and any useful jumps."""
     formulas, rng = Formulas(instance), np.random.default_rng(2)
@@ -104,7 +95,7 @@ def variants(name, formulation):
                     cf.formulate(kind(name), formulation, limits=True)
                 continue
             field = cf.improved_field(field)  # limits cut off fields that one jump improves
-        problems += [problem_of(name, formulation, **{option: value})[0] for value in CHOICES[option]]
+        problems += [problem_of(name, formulation, **{option: value})[0] for value in OPTIONS[option]]
     if "cycle" in formulation and len(field.instance.domain.ring_vertices):
         problems.append(with_indices_of(field, formulation))
     return problems, field

@@ -80,6 +80,11 @@ def with_header(old: bytes, new: bytes) -> Callable[[bytes], bytes]:
     return of
 
 
+def headed(header: bytes) -> Callable[[bytes], bytes]:
+    """A function that replaces the header of an array."""
+    return lambda content: content[:8] + struct.pack("<H", len(header) + 1) + header + b"\n" + content[128:]
+
+
 def overstated(archive: bytes) -> bytes:
     """The archive whose first member is larger, by its header and its directory entry, than it is."""
     data, start = bytearray(archive), struct.unpack("<L", archive[-6:-2])[0]
@@ -143,6 +148,13 @@ def forged(name: str) -> dict[str, Callable[[bytes], bytes]]:
         "a header with a negative side": changed(with_header(b"(", b"(-1, -")),
         "a header with an enormous side": changed(with_header(b"(", b"(99999999")),
         "a header that is an expression": changed(with_header(b"(", b"(1*")),
+        "an escape that Python does not know": changed(with_header(b"<f8", b"\\d")),
+        "a number that runs into a word": changed(with_header(b"False", b"0or 1")),
+        "a long integer of Python 2": changed(with_header(b",)", b"L,)")),
+        "the old name of a kind": changed(with_header(b"<f8", b"a8")),
+        "a header of many sides": changed(headed(b"{'shape': (" + 5000 * b"3, " + b"), }")),
+        "no header": changed(headed(b"")),
+        "control characters": changed(headed(b"{'descr': '" + 300 * b"\x1b[31m\x07" + b"'}")),
         "bits beyond 1": bits_beyond_1,
     }  # fmt: skip
 

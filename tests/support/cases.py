@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import crossfield as cf
@@ -17,6 +18,15 @@ SKEWED = list_formulations()
 """The formulations of crosses that may be skewed."""
 RIGHT = [name for name in FORMULATIONS if name not in SKEWED]
 """Those of orthogonal crosses only."""
+
+OPTIONS = {
+    "relax": [True],
+    "facet": ["printed"],
+    "stroke_norm": [1, 2],
+    "beta_norm": [1, 2],
+    "limits": [True],
+}
+"""Values of the options of formulations, other than their defaults or all."""
 
 MASKS = {
     "hole": ["###", "#.#", "###"],
@@ -75,3 +85,10 @@ def make_problem(name: str, instance: cf.Instance, **options: Any) -> Problem:
 def points_of(problem: Problem, count: int = 20, seed: int = 3) -> Floats:
     """Random points (count, columns), with no regard to bounds, rows and integrality."""
     return np.random.default_rng(seed).normal(size=(count, problem.n_columns))
+
+
+def write_point(path: Path, problem: Problem, point: Floats) -> Path:
+    """Write a list of names and values as any program might."""
+    pairs = zip(problem.to_arrays().column_names.tolist(), point.tolist(), strict=True)
+    path.write_text("".join(f"{name} {value!r}\n" for name, value in pairs))
+    return path

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import crossfield as cf
 import numpy as np
+from cases import write_point
 
 SVG = (
     '<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 60 40" fill="none" stroke="black">'
@@ -51,6 +52,5 @@ def write_inputs(folder):
     cf.write(problem, folder / "set", formats=["lp"])
     for name, field in (("good", good), ("bad", bad)):
         cf.write_field(field, folder / f"{name}.npz")
-        values = zip(problem.to_arrays().column_names.tolist(), problem.point(field).tolist(), strict=True)
-        (folder / f"{name}.sol").write_text("".join(f"{key} {value!r}\n" for key, value in values))
+        write_point(folder / f"{name}.sol", problem, problem.point(field))
     return folder

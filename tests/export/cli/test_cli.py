@@ -10,7 +10,7 @@ from pathlib import Path
 import crossfield as cf
 import pytest
 from answers import HIGHS_STATES_BOUNDS
-from cases import make_instance
+from cases import make_instance, write_point
 from children import complaints as without_progress
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
@@ -167,9 +167,7 @@ def test_help_loads_nothing_heavy():
 def test_files_are_written_and_read_without_solvers_proofs_and_libraries(crossfield, instance, instance_file):
     assert not modules_of("export", instance_file, "-f", "milp", "-F", "mps", "-o", "set") & HEAVY
     problem = cf.read_manifest("set/tiny.milp-mccormick.manifest.json").problem()
-    columns = problem.to_arrays().column_names
-    point = zip(columns, problem.point(cf.greedy_field(instance)), strict=True)
-    Path("a.sol").write_text("".join(f"{name} {float(value)}\n" for name, value in point))
+    write_point(Path("a.sol"), problem, problem.point(cf.greedy_field(instance)))
     manifest = "set/tiny.milp-mccormick.manifest.json"
     assert not modules_of("read", "a.sol", "--manifest", manifest, "-o", "field.npz") & HEAVY
 

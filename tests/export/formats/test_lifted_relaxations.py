@@ -8,6 +8,7 @@ import pytest
 from crossfield.export.solving.local import choose_solver
 from crossfield.export.verify.checks import Verdict
 from crossfield.export.verify.verify import judge_solves, verify
+from instance_kinds import grid
 
 RELAXED = {"relax": True}
 
@@ -15,9 +16,7 @@ RELAXED = {"relax": True}
 @pytest.fixture(scope="module")
 def two():
     """Two pixels whose strokes pull p1 between 0 and 1, where the hull of the product is larger than it."""
-    mask, pixels = np.ones((1, 2), dtype=bool), [[0, 0], [0, 1]]
-    strokes = pixels, [0.5, 2.2], [1.0, 1.0]
-    return cf.Instance.on_pixels("two", mask, *strokes, skew_coefficient=1.0, gauge="box")
+    return grid("//", [0.5, 2.2], stroke_coefficient=1.0, skew_coefficient=1.0, gauge="box")
 
 
 @pytest.mark.parametrize("name", ["minlp-quartic", "minlp-cubic"])

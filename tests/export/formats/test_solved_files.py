@@ -10,7 +10,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from ampl_by_glpk import glpsol
-from instance_kinds import kind
+from instance_kinds import grid, kind
 
 
 @pytest.mark.needs("glpk")
@@ -32,22 +32,15 @@ def test_an_answer_of_the_ampl_model_is_read_back(tmp_path):
         assert solution.objective == pytest.approx(float(claim), abs=1e-9)
 
 
-def small(width):
-    """Pixels with strokes that no field follows without loss: the window is the box's."""
-    at = [[0, column] for column in range(width)]
-    strokes = at, [2.2, 1.3][:width], [1.0, 0.7][:width]
-    return cf.Instance.on_pixels(
-        "small", np.ones((1, width), bool), *strokes, skew_coefficient=1e-2, gauge="box"
-    )
-
-
 @pytest.mark.needs("baron")
 @pytest.mark.parametrize(
     "formulation, width", [("minlp-quartic", 2), ("miqcp-bilinear", 2), ("milp-mccormick", 1)]
 )
 def test_baron_solves_its_file_to_the_optimum(formulation, width, tmp_path):
     """Its free edition takes 10 columns and 10 rows: two pixels at most."""
-    problem = cf.formulate(small(width), formulation)
+    window = {"stroke_coefficient": 1.0, "skew_coefficient": 1e-2, "gauge": "box"}
+    # No field follows both strokes without loss.
+    problem = cf.formulate(grid("/" * width, [2.2, 1.3], [1.0, 0.7], **window), formulation)
     cf.write(problem, tmp_path / "model.bar")
     program = Path(*importlib.util.find_spec("gamspy_baron").submodule_search_locations, "baron")
     command = [program, "model.bar"]

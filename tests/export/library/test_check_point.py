@@ -12,18 +12,11 @@ from pathlib import Path
 import crossfield as cf
 import highspy
 import pytest
-from cases import RIGHT, SKEWED, make_field, make_instance, make_problem, points_of
+from cases import RIGHT, SKEWED, make_field, make_instance, make_problem, points_of, write_point
 from crossfield.export.formats.registry import FORMATS, problem_in_format, write
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.documents.check_point import check
 from loops import for_each
-
-
-def save_point(path, problem, point):
-    """A list of names and values as any program might write it."""
-    pairs = zip(problem.to_arrays().column_names.tolist(), point.tolist(), strict=True)
-    path.write_text("".join(f"{name} {value!r}\n" for name, value in pairs))
-    return str(path)
 
 
 def verdict_on(folder, model, point):
@@ -51,7 +44,7 @@ def test_objective_and_violations_are_those_of_the_problem(name, shape, tmp_path
     problem = problem_in_format(whole, FORMATS["mps"])
     write(whole, tmp_path / "m.mps.gz")
     for point in points_of(problem, count=2):
-        verdict = check(str(tmp_path / "m.mps.gz"), save_point(tmp_path / "p.sol", problem, point))
+        verdict = check(str(tmp_path / "m.mps.gz"), str(write_point(tmp_path / "p.sol", problem, point)))
         ours, objective = problem.violation(point), problem.objective_value(point)
         assert float(verdict.objective) == pytest.approx(objective, rel=1e-11, abs=1e-11)
         for kind, value in (("bounds", ours.bounds), ("rows", ours.rows), ("integers", ours.integrality)):
@@ -240,8 +233,8 @@ def test_a_point_that_states_another_problem_is_refused(tmp_path, capsys):
     for problem, expected in zip(problems, (0, 2), strict=True):
         write(problem, tmp_path / "other.mps")
         (one,) = set(re.findall(r"ONE_\w+", (tmp_path / "other.mps").read_text()))
-        point = save_point(tmp_path / "p.sol", problem, problem.point(make_field(problem.instance)))
-        Path(point).write_text(f"{one} 1\n{Path(point).read_text()}")
+        point = write_point(tmp_path / "p.sol", problem, problem.point(make_field(problem.instance)))
+        point.write_text(f"{one} 1\n{point.read_text()}")
         code, out, err = called(capsys, model, point)
         assert code == expected, err
     assert (out, "another instance or formulation" in err) == ("", True)

@@ -7,20 +7,8 @@ import crossfield as cf
 import pytest
 from libraries import content, defects, document, library_of
 from loops import for_each
+from small_drawings import HOSTILE
 
-HOSTILE = b"""<?xml version="1.0"?><?xml-stylesheet href="http://evil.example/a.css"?>
-<!DOCTYPE svg PUBLIC "-//W3C//DTD SVG 1.1//EN" "http://evil.example/svg11.dtd">
-<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 150 110"
- onload="alert('loaded')"><title>evil title</title><!-- evil comment --><metadata>evil</metadata>
-<script>alert('script')</script><script href="http://evil.example/x.js"/>
-<style>@import url(http://evil.example/style.css); path { filter: url(http://evil.example/f#x) }</style>
-<image xlink:href="http://evil.example/track.png" width="150" height="110"/>
-<use xlink:href="http://evil.example/other.svg#a"/>
-<foreignObject><iframe xmlns="http://www.w3.org/1999/xhtml" src="http://evil.example"/></foreignObject>
-<a xlink:href="javascript:alert(1)"><g fill="none" stroke="#000"><path d="M20 30H120V90H20Z"/>
-<path d="M20 60H120" stroke="#e00000" onclick="alert('clicked')"/>
-<path id="&quot;&gt;&lt;script&gt;" d="M70 30V90" stroke="#e00000"/></g></a>
-<text>http://evil.example</text><animate href="#a" attributeName="d"/></svg>"""
 SHOWN = """<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 150 110" fill="none" stroke="#000" \
 stroke-width="0.375" stroke-linecap="round" stroke-linejoin="round">
 <path d="M20 30L120 30 120 90 20 90 20 30"/>

@@ -9,6 +9,7 @@ import crossfield as cf
 import numpy as np
 import pandas as pd
 import pytest
+from instance_kinds import grid
 
 PACKAGES = [
     "highs",
@@ -24,10 +25,7 @@ def instance_of(domain):
     """Three pixels in a row or the four faces of a closed mesh, with strokes that contradict each other."""
     weights = {"stroke_coefficient": 1.0, "skew_coefficient": 0.1}
     if domain == "grid":
-        pixels = np.ones((1, 3), bool)
-        return cf.Instance.on_pixels(
-            "row", pixels, [[0, 0], [0, 1], [0, 2]], [0.1, 0.9, 1.2], np.ones(3), **weights
-        )
+        return grid("///", [0.1, 0.9, 1.2], **weights)
     corners = [[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
     mesh = cf.Mesh(corners, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
     return cf.Instance.on_faces("closed", mesh, [0, 2], [0.4, 1.0], np.ones(2), **weights)
@@ -112,9 +110,7 @@ IN_SQUARES, IN_AMOUNTS = 0.026406, 0.027006
 @pytest.mark.needs("linopy")
 @pytest.mark.needs("pyomo")
 def test_nonlinear_problems_with_integers_come_back_proven(name, package):
-    strokes = [[0, 0], [0, 1]], [0.1, 0.9], np.ones(2)
-    weights = {"stroke_coefficient": 1.0, "skew_coefficient": 0.1}
-    problem = cf.formulate(cf.Instance.on_pixels("pair", np.ones((1, 2), bool), *strokes, **weights), name)
+    problem = cf.formulate(grid("//", [0.1, 0.9], stroke_coefficient=1.0, skew_coefficient=0.1), name)
     model = getattr(problem, f"to_{package}")()
     stated = {}
     if package == "pyomo":
@@ -210,8 +206,7 @@ def test_a_model_of_another_problem_or_without_an_answer_is_refused(package):
     with pytest.raises(cf.SolutionError, match="no values yet; solve it with"):
         problem.solution(model)
     stated = solve(package, model)
-    weights = cf.Instance.on_pixels("row", np.ones((1, 3), bool), [[0, 0]], [0.1], np.ones(1))
-    for foreign in (other, cf.formulate(weights, "milp-mccormick", stroke_norm=1)):
+    for foreign in (other, cf.formulate(grid("/##", 0.1), "milp-mccormick", stroke_norm=1)):
         with pytest.raises(cf.SolutionError):
             foreign.solution(model, **stated)
 

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 from crossfield.models.errors import DomainError
 from crossfield.models.mesh.shapes import MESHES
-from loops import for_each
 from meshes import flat_sheet
 from PIL import Image
 from scipy import ndimage
@@ -72,9 +71,3 @@ def test_corners_behind_a_wall_are_hidden(tmp_path):
     field = along_the_edges("bracket")
     path = cf.draw(field, tmp_path / "bracket.png")
     assert 0 < dots(path, NEGATIVE) < (field.singularities.index < 0).sum()
-
-
-@for_each("kind", ["angle", "field", "overview", "layers"])
-def test_kinds_that_show_pixels_are_refused_with_the_others_named(kind, tmp_path):
-    with pytest.raises(DomainError, match="choose one of instance, crosses"):
-        cf.draw(along_the_edges("cube"), tmp_path / "a.png", kind=kind)

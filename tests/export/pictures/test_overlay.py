@@ -15,19 +15,10 @@ from layered import SVG, layers_of, lines_in, numbers
 from loops import for_each
 from photographs import draw_sheet, encode, photograph
 from PIL import Image, ImageDraw
+from small_drawings import HOSTILE
 
 BOXES = """<g fill="none" stroke="#000" stroke-width="2"><path d="M20 30H120V90H20Z"/>
 <path d="M20 60H120" stroke="#e00000"/><path d="M70 30V90" stroke="#e00000"/></g>"""
-HOSTILE = f"""<?xml version="1.0"?>
-<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" viewBox="0 0 150 110"
- onload="alert('loaded')"><title>secret title</title>
-<script>alert('script')</script><script href="http://evil.example/x.js"/>
-<style>@import url(http://evil.example/style.css); path {{ filter: url(http://evil.example/f#x) }}</style>
-<image xlink:href="http://evil.example/track.png" width="150" height="110"/>
-<use xlink:href="http://evil.example/other.svg#a"/><a xlink:href="javascript:alert(1)">{BOXES}</a>
-<foreignObject><iframe xmlns="http://www.w3.org/1999/xhtml" src="http://evil.example"/></foreignObject>
-<path id="&quot;&gt;&lt;script&gt;" onclick="alert('clicked')" d="M30 40H40" stroke="#000"/>
-<text>http://evil.example</text><animate href="#a" attributeName="d"/></svg>"""
 
 
 def svg(path, body=BOXES):
@@ -88,11 +79,11 @@ def test_a_page_that_the_field_reaches_beyond_grows_in_the_unit_that_the_drawing
 
 
 def test_nothing_of_a_hostile_drawing_but_its_strokes_comes_out(tmp_path):
-    (tmp_path / "evil.svg").write_text(HOSTILE)
+    (tmp_path / "evil.svg").write_bytes(HOSTILE)
     field = field_of(tmp_path / "evil.svg")
     path = cf.draw(field, tmp_path / "over.svg", underlay=tmp_path / "evil.svg")
     text = path.read_text().lower()
-    for word in ("evil", "script", "alert", "secret", "onload", "onclick", "image", "use", "iframe", "style>",
+    for word in ("evil", "script", "alert", "onload", "onclick", "image", "use", "iframe", "style>",
                  "url(", "href=", "<text", "animate", "entity", "doctype"):  # fmt: skip
         assert word not in text, word
     tags = {element.tag for element in ElementTree.fromstring(path.read_bytes()).iter()}

@@ -10,6 +10,7 @@ from html import unescape
 import crossfield as cf
 import pytest
 from browsing import CONTRAST, find, served, show, sideways
+from cases import write_point
 from crossfield.export.cli.app import invoke
 
 pytestmark = pytest.mark.slow
@@ -66,10 +67,7 @@ def test_the_line_that_reads_an_answer_back_reads_it(folder, monkeypatch):
     stem = f"{instance.name}.milp-mccormick"
     page = (folder / "index.html").read_text(encoding="utf-8")
     (line,) = re.findall(rf"^crossfield read {stem}\.mps\.sol .*$", page, re.MULTILINE)
-    point = problem.point(cf.greedy_field(instance))
-    names = problem.to_arrays().column_names
-    text = "\n".join(f"{name} {value!r}" for name, value in zip(names, point.tolist(), strict=True))
-    (folder / f"{stem}.mps.sol").write_text(f"{text}\n")
+    write_point(folder / f"{stem}.mps.sol", problem, problem.point(cf.greedy_field(instance)))
     monkeypatch.chdir(folder)
     assert invoke(shlex.split(line.removesuffix("</pre>"))[1:]) == 0
     assert (folder / f"{stem}.npz").exists()

@@ -2,8 +2,6 @@
 
 import gzip
 import hashlib
-import subprocess
-import sys
 import zlib
 
 import crossfield as cf
@@ -33,26 +31,6 @@ def test_count_and_hash_are_those_of_the_file(chunks, tmp_path):
     reader = zlib.decompressobj(16 + zlib.MAX_WBITS)
     reader.decompress(packed)
     assert (reader.eof, reader.unused_data) == (True, b"")
-
-
-FULL = """
-import resource, sys
-from pathlib import Path
-from crossfield.export.writing.sink import save_file
-from crossfield.models.errors import OutputError
-resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 20, 1 << 20))
-try:
-    save_file(Path(sys.argv[1]), (bytes(1 << 18) for _ in range(5)))
-except OutputError as error:
-    print(error)
-"""
-
-
-def test_a_disk_that_takes_no_more_is_an_error_of_output_and_leaves_nothing(tmp_path):
-    command = [sys.executable, "-c", FULL, str(tmp_path / "a.lp")]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "a.lp: cannot be written: file too large; free some space" in done.stdout
-    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize("suffix", ["lp", "mps"])

@@ -38,16 +38,6 @@ def test_json_of_a_mesh_states_each_jump_with_its_faces(on_faces, tmp_path):
     assert (document["faces"], document["jumps"]) == ([[0.1, 0], [0.2, 0]], [[1, 0, -1]])
 
 
-def test_an_unknown_ending_is_refused_before_anything_is_written(field, tmp_path):
-    for name in ("field.txt", "field", "field.obj"):
-        with pytest.raises(
-            cf.InputError, match=r"selects no format; choose one of \.npz, \.json, \.rawfield"
-        ):
-            cf.write_field(field, tmp_path / name)
-    refused(cf.read_field, tmp_path / "a.obj", "has the suffix '.obj', which selects no", cf.InputError)
-    assert list(tmp_path.iterdir()) == []
-
-
 def pixel(number, column, value):
     def edit(document):
         document["pixels"][number][column] = value
@@ -66,6 +56,7 @@ def pixel(number, column, value):
         ("field", lambda d: d | {"instance": d["instance"] | {"gauge": "x"}}, "its instance: $.gauge: 'x' "),
         ("field", pixel(3, 1, 2), "$.pixels[3]: is [1, 2], but the mask has [1, 0] there"),
         ("field", pixel(0, 3, 10**400), "beyond the range of doubles"),
+        ("field", pixel(1, 2, 1e308), "alpha holds something other than angles"),
         ("field", pixel(0, 4, 1), "$.pixels[0]: a jump belongs where the mask has the upper neighbour, null"),
         ("field", pixel(0, 5, None), "$.pixels[0]: a jump belongs where the mask has the right neighbour"),
         ("on_faces", change("jumps", [[0, 1, -1]]), "$.jumps: lists other pairs of faces than the mesh has"),

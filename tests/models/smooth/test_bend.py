@@ -11,7 +11,7 @@ from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, tremble
 from crossfield.models.smooth.polyvector import HOLDS
 from exhaustive import sketch
 from loops import for_each
-from moves import MOVES, lines
+from moves import lines
 
 
 def noisy(instance, degrees, seed):
@@ -74,22 +74,6 @@ def test_the_energy_falls_and_the_singularities_stay(name):
     assert field.singularities.index.tolist() == start.singularities.index.tolist()
     again = cf.bend_field(field, harmonic=HARMONIC, hold=hold)
     assert bend_energy(again, hold) <= bend_energy(field, hold) * (1 + 1e-9)
-
-
-@pytest.mark.parametrize("moved_instance", MOVES)
-def test_the_field_moves_with_the_sketch(moved_instance):
-    move, turn = MOVES[moved_instance]
-    for instance in (cf.sample("mouse", 14), cf.sample("singular", 12)):
-        start, other = cf.polyvector_field(instance, hold=max(HOLDS)), moved_instance(instance)
-
-        def there(field, mask=other.mask):
-            return [turn(move(field.image(line)))[mask] for line in lines(field)]
-
-        plain = cf.polyvector_field(other, hold=max(HOLDS))
-        assert plain.cross_error(*there(start)) == pytest.approx(0, abs=1e-6)
-        assert plain.energy().total == pytest.approx(start.energy().total, rel=1e-6)
-        moved = cf.bend_field(cf.CrossField.from_lines(other, *there(start)))
-        assert moved.cross_error(*there(cf.bend_field(start))) == pytest.approx(0, abs=1e-6)
 
 
 def test_labels_do_not_matter():
