@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from ...models.errors import InputError, shortened
 from . import options
@@ -15,6 +16,8 @@ from .output import print_result, show_progress, show_surface
 if TYPE_CHECKING:
     from ...models.field.field import CrossField
     from ...models.surface.hints import Hint
+
+_Value = TypeVar("_Value")
 
 
 def shade_command(
@@ -45,7 +48,7 @@ def shade_command(
     from ..pictures.underlay import read_underlay
     from ..surfaces.files import FILES, REPORT, choose_view, write_surface
 
-    hints, bowls = parse_hints(hint), parse_places(concave)
+    hints, bowls = parse_hints(hint), [_parse_place(text) for text in concave or ()]
     underlay = underlay or find_drawing(source)
     check_targets(output, FILES, reads=[path for path in (source, underlay) if path is not None], force=force)
     with show_progress() as show:
@@ -54,10 +57,8 @@ def shade_command(
         drawing = None if underlay is None else read_underlay(underlay, on=field.instance)
         choose_view(field.instance, drawing, side)  # checks the side before the work
         solid = surface(field, hints, flip=flip, concave=bowls, progress=show)
-        degrees = [[h.row, h.column, *(round(math.degrees(a), 4) for a in (h.slant, h.tilt))] for h in hints]
-        named = [dict(zip(("row", "column", "slant", "tilt"), hint, strict=True)) for hint in degrees]
         show("drawing and writing")
-        about = {"flipped": flip, "concave": bowls, "hints": named}
+        about = {"flipped": flip, "concave": bowls, "hints": [given.in_degrees for given in hints]}
         write_surface(solid, output, drawing=drawing, side=side, about=about, force=force)
     document = json.loads((output / REPORT).read_text("utf-8"))
     print_result(document, lambda: show_surface(solid, document, output), as_json=as_json)
@@ -77,32 +78,24 @@ def _read_or_compute_field(source: str, size: int | None) -> CrossField:
     return surface_field(content)
 
 
-def parse_hints(texts: list[str] | None) -> tuple[Hint, ...]:
+def parse_hints(texts: list[str] | None) -> list[Hint]:
     """Hints from texts in degrees. Raises InputError for a malformed text."""
     from ...models.surface.hints import Hint
 
-    hints = []
-    for text in texts or ():
-        try:
-            row, column, slant, tilt = text.split(",")
-            hint = Hint(int(row), int(column), math.radians(float(slant)), math.radians(float(tilt)))
-        except ValueError as error:
-            raise InputError(
-                f"--hint {shortened(text)!r} is malformed; give ROW,COLUMN,SLANT,TILT as in 12,30,45,90"
-            ) from error
-        hints.append(hint)
-    return tuple(hints)
+    def parse(row: str, column: str, slant: str, tilt: str) -> Hint:
+        return Hint(int(row), int(column), math.radians(float(slant)), math.radians(float(tilt)))
+
+    return [_parse(text, parse, "--hint", "ROW,COLUMN,SLANT,TILT as in 12,30,45,90") for text in texts or ()]
 
 
-def parse_places(texts: list[str] | None) -> list[tuple[float, float]]:
-    """Places from texts. Raises InputError for a malformed text."""
-    places = []
-    for text in texts or ():
-        try:
-            x, y = map(float, text.split(","))
-        except ValueError as error:
-            raise InputError(
-                f"--concave {shortened(text)!r} is malformed; give X,Y as in 120,80.5"
-            ) from error
-        places.append((x, y))
-    return places
+def _parse_place(text: str) -> tuple[float, float]:
+    """A place from its text. Raises InputError for a malformed text."""
+    return _parse(text, lambda x, y: (float(x), float(y)), "--concave", "X,Y as in 120,80.5")
+
+
+def _parse(text: str, parse: Callable[..., _Value], option: str, form: str) -> _Value:
+    """The value of the numbers in a text. Raises InputError for a malformed text."""
+    try:
+        return parse(*text.split(","))
+    except (TypeError, ValueError) as error:
+        raise InputError(f"{option} {shortened(text)!r} is malformed; give {form}") from error

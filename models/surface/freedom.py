@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 from scipy import ndimage, sparse
-from scipy.sparse.linalg import eigsh
+from scipy.sparse.linalg import ArpackError, eigsh
 
 from ..instance.domain import Bools, Floats
 from ..instance.instance import Instance
@@ -62,26 +62,13 @@ class Freedom:
         """An option of `crossfield shade` that decides it."""
         if self.hint is None:
             return f"--concave {self.place[0]:g},{self.place[1]:g}"
-        return "--hint " + ",".join(f"{number:g}" for number in _in_degrees(self.hint).values())
+        return "--hint " + ",".join(f"{number:g}" for number in self.hint.in_degrees.values())
 
     def document(self) -> dict[str, Any]:
         """The choice as JSON, with angles in degrees."""
-        return {
-            "kind": self.kind,
-            "part": self.part,
-            "pixels": self.pixels,
-            "x": self.place[0],
-            "y": self.place[1],
-            "hint": self.hint and _in_degrees(self.hint),
-            "option": self.option,
-            "text": str(self),
-        }
-
-
-def _in_degrees(hint: Hint) -> dict[str, float]:
-    """The numbers of a hint, with its angles in whole degrees."""
-    slant, tilt = np.degrees([hint.slant, hint.tilt]).round().tolist()
-    return {"row": hint.row, "column": hint.column, "slant": slant, "tilt": tilt % 360}
+        where = {"part": self.part, "pixels": self.pixels, "x": self.place[0], "y": self.place[1]}
+        hint = self.hint and self.hint.in_degrees
+        return {"kind": self.kind, **where, "hint": hint, "option": self.option, "text": str(self)}
 
 
 def find_deepest(inside: Bools) -> tuple[int, int]:
@@ -114,11 +101,14 @@ def find_open_depth(level: GridLevel, z: Floats, extra: Sequence[Residuals]) -> 
     fixed = _TWIST * stencils.twist.T @ stencils.twist + _PULL * sparse.eye_array(stencils.count)
     square = sum(change.T @ change for change in changes)
     start = np.ones(stencils.count)
-    gain, modes = eigsh(square, _MODES, (misfit + _LOCAL * uneven + fixed).tocsc(), v0=start)
-    for softness, mode in sorted(zip(gain**-0.5, modes.T, strict=True), key=lambda pair: float(pair[0])):
+    try:
+        gain, modes = eigsh(square, _MODES, (misfit + _LOCAL * uneven + fixed).tocsc(), v0=start)
+    except ArpackError:
+        return None  # as for equations without a distinct softest change
+    for mode in modes.T[gain >= SOFT**-2][::-1]:
         turn = np.stack([change @ mode for change in changes])
         size = np.sum(turn**2, axis=0)
-        if softness <= SOFT and size.sum() ** 2 >= _WHOLE * len(size) * np.sum(size**2):
+        if size.sum() ** 2 >= _WHOLE * len(size) * np.sum(size**2):
             return _turned_hint(level, normals_of(stencils, z), turn)
     return None
 
@@ -130,11 +120,9 @@ def _turned_hint(level: GridLevel, normals: Floats, turn: Floats) -> Hint:
     at = int(np.argmax(np.where(depth >= depth.max() / 2, size, 0.0)))
     step = turn[:, at] / size[at]
     x, y, z = normals[:, at] + _TURN * (step if step[2] >= 0 else -step)
-    row, column = (
-        int(corner + (where[at] << level.halved))
-        for corner, where in zip(level.corner, (grid.rows, grid.columns), strict=True)
-    )
-    return Hint(row, column, float(np.arctan2(np.hypot(x, y), z)), float(np.arctan2(y, x)))
+    row, column = np.add(level.corner, np.array([grid.rows[at], grid.columns[at]]) << level.halved)
+    slant, tilt = np.degrees([np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)]).round() % 360
+    return Hint(int(row), int(column), float(np.radians(slant)), float(np.radians(tilt)))
 
 
 def _depth(inside: Bools) -> Floats:

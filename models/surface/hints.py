@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final
@@ -41,6 +42,12 @@ class Hint:
     tilt: float = 0.0
 
     @property
+    def in_degrees(self) -> dict[str, float]:
+        """Its four numbers by name, with angles in degrees to four decimals."""
+        angles = {name: round(math.degrees(getattr(self, name)), 4) for name in ("slant", "tilt")}
+        return {"row": self.row, "column": self.column, **angles}
+
+    @property
     def slopes(self) -> Floats:
         """The slopes (dz/dx, dz/dy) of a surface with this normal."""
         return np.asarray(-np.tan(self.slant) * np.array([np.cos(self.tilt), np.sin(self.tilt)]))
@@ -71,15 +78,12 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
 
 def find_pixels(places: Iterable[tuple[float, float]], instance: Instance) -> list[tuple[int, int]]:
     """Row and column at places in the drawing. Raises InputError for one outside the mask."""
-    pixels = []
+    pixels, mask = [], instance.mask
     for x, y in places:
         column, row = np.floor((np.array([x, y]) - instance.origin) / instance.pixel_size)
-        inside = 0 <= row < instance.grid.height and 0 <= column < instance.grid.width
-        if not inside or not instance.mask[int(row), int(column)]:
-            raise InputError(
-                f"the place ({x:g}, {y:g}) lies outside the mask of {instance.name}; give one inside, in the "
-                "coordinates of the drawing"
-            )
+        if not (0 <= row < len(mask) and 0 <= column < len(mask[0]) and mask[int(row), int(column)]):
+            place = f"the place ({x:g}, {y:g}) lies outside the mask of {instance.name}"
+            raise InputError(f"{place}; give one inside, in the coordinates of the drawing")
         pixels.append((int(row), int(column)))
     return pixels
 

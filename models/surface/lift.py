@@ -101,7 +101,7 @@ def surface(
             if not (is_bowl or _decide_side(part_hints)):
                 middle = place_of(instance, *find_deepest(part_of == number))
                 freedom.append(Freedom("side", number, level.grid.size, middle))
-            if other:
+            if other and part_of[other.row, other.column] == number:
                 place = place_of(instance, other.row, other.column)
                 freedom.append(Freedom("depth", number, level.grid.size, place, other))
     off = right_angle_deviation(field, heights)
