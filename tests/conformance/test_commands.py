@@ -6,7 +6,7 @@ import crossfield as cf
 import pytest
 from crossfield.export.cli.app import app, invoke
 from crossfield.export.runs.methods import METHODS
-from instance_kinds import SMALL, crossed, kind, on_mesh
+from instance_kinds import SMALL, crossed, is_provable, kind, on_mesh
 from typer.main import get_command
 
 COMMANDS = {
@@ -41,11 +41,7 @@ def refuses(command, instance):
         return "on the faces of a mesh" if on_mesh(instance) else None
     if command in {"solve polyvector", "solve bend"}:
         return "finds no fields on the" if on_mesh(instance) or instance.orthogonal else None
-    if (
-        command == "prove"
-        and not instance.orthogonal
-        and (on_mesh(instance) or instance.pair_weights is not None)
-    ):
+    if command == "prove" and not is_provable(instance):
         return "on the faces of a mesh" if instance.pair_weights is None else "has weights of pairs"
     return None
 

@@ -9,7 +9,7 @@ import pytest
 from crossfield.models.errors import DomainError
 from hypothesis import given, settings
 from independent_energy import Formulas, angle_in
-from instance_kinds import KINDS, MANY, SMALL, TINY, crossed, instances, kind, on_mesh
+from instance_kinds import KINDS, MANY, SMALL, TINY, crossed, instances, is_provable, kind, on_mesh
 
 NORMS = (1, 2, "mixed")
 WORK = 4000
@@ -45,10 +45,8 @@ def refusal(method, instance):
     """The error by which a method refuses an instance, as it documents; None where it must not."""
     if method in {"polyvector", "bend"}:
         return DomainError if on_mesh(instance) else None
-    if method == "prove" and not instance.orthogonal:
-        return (
-            cf.InputError if instance.pair_weights is not None else DomainError if on_mesh(instance) else None
-        )
+    if method == "prove" and not is_provable(instance):
+        return DomainError if instance.pair_weights is None else cf.InputError
     return None
 
 
@@ -124,7 +122,7 @@ def assert_order(instance):
     assert found.energies[-1][1] == pytest.approx(energy, rel=1e-6, abs=1e-9)
     least = Formulas(instance).least(2)
     assert least is None or energy >= least - close
-    if refusal("prove", instance) is None:
+    if is_provable(instance):
         proof = prove(instance, patience())
         assert proof.bound <= min(proof.energy, energy if least is None else least) + close
         assert proof.status != "optimal" or proof.energy <= energy + 10 * close
@@ -150,9 +148,7 @@ def test_instances_of_any_kind_keep_the_order(instance):
     assert_order(instance)
 
 
-PROVEN_IN_OTHER_NORMS = [
-    name for name in TINY if not kind(name).orthogonal and refusal("prove", kind(name)) is None
-]
+PROVEN_IN_OTHER_NORMS = [name for name in TINY if not kind(name).orthogonal and is_provable(kind(name))]
 
 
 @pytest.mark.parametrize("name", crossed(PROVEN_IN_OTHER_NORMS, every=4))
@@ -258,7 +254,7 @@ def test_symmetric_copies_have_the_same_energies(name):
 
 
 @pytest.mark.parametrize(
-    "name", crossed([n for n in SYMMETRIC if not refusal("prove", kind(n)) and n in TINY], every=3)
+    "name", crossed([n for n in SYMMETRIC if is_provable(kind(n)) and n in TINY], every=3)
 )
 def test_a_bound_holds_for_symmetric_copies(name):
     proof = prove(kind(name))

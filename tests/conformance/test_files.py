@@ -13,7 +13,7 @@ from folders import contents
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from independent_energy import Formulas
-from instance_kinds import KINDS, SMALL, crossed, instances, kind, on_mesh
+from instance_kinds import KINDS, SMALL, crossed, instances, is_provable, kind, on_mesh
 
 
 def choices(call, *arguments, **more):
@@ -85,11 +85,6 @@ def others_than(instance, suffix):
     yield cf.sample("disc") if on_mesh(instance) else cf.sample("bottle", 8)
     if suffix in LOSSLESS:
         yield replace(instance, name="another")
-
-
-def is_provable(instance):
-    """Whether proofs take an instance."""
-    return instance.orthogonal or (not on_mesh(instance) and instance.pair_weights is None)
 
 
 PROVABLE = [name for name in SMALL if is_provable(kind(name))]

@@ -5,6 +5,7 @@ from functools import cache
 from importlib.metadata import version
 
 import crossfield as cf
+import highspy
 import numpy as np
 import places
 
@@ -12,6 +13,8 @@ HERE = places.SOLUTIONS
 TINY = HERE / "tiny"
 GOOD = sorted(path for path in TINY.iterdir() if path.is_file())
 BAD = sorted((TINY / "bad").iterdir())
+OTHERS = sorted(HERE.glob("*.sol"))
+"""Files of HiGHS and of AMPL's solvers for problems that are not ours."""
 HIGHS_STATES_BOUNDS = tuple(map(int, version("highspy").split(".")[:2])) >= (1, 16)
 """Whether its solution files state the dual bound."""
 WITH_POINT = {"optimal-global", "optimal-in-gap", "optimal-local", "feasible", "limit-with-point"}
@@ -172,6 +175,24 @@ def problem_of(path):
     """The problem that a file is of, named after its solver, in GAMS after that of GAMS's solver."""
     words = path.stem.split("_")
     return next((word for word in words if word in OPTIMA), None)
+
+
+def listed(raw):
+    """Entries of a file: values by name, or by place."""
+    names = range(len(raw.values)) if raw.names is None else raw.names.tolist()
+    return dict(zip(names, raw.values.tolist(), strict=True))
+
+
+def by_highs(model, answer, gap=0.0, style=0, **options):
+    """Let HiGHS answer a model file."""
+    highs = highspy.Highs()
+    highs.setOptionValue("output_flag", False)
+    highs.readModel(str(model))
+    for name, value in {"mip_rel_gap": gap, "threads": 1, **options}.items():
+        highs.setOptionValue(name, value)
+    highs.run()
+    highs.writeSolution(str(answer), style)
+    return answer
 
 
 def binary_sol(message, of, point):

@@ -146,6 +146,11 @@ def on_mesh(instance: cf.Instance) -> bool:
     return instance.domain.kind == "face"
 
 
+def is_provable(instance: cf.Instance) -> bool:
+    """Whether proofs take an instance."""
+    return instance.orthogonal or (not on_mesh(instance) and instance.pair_weights is None)
+
+
 @cache
 def kind(name: str) -> cf.Instance:
     """The instance of a kind, the same object every time."""

@@ -3,9 +3,9 @@
 import re
 import shlex
 
-import highspy
 import pytest
 import typer
+from answers import by_highs
 from crossfield.export.cli.app import app, invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.library.plan.spec import RUNGS
@@ -67,10 +67,7 @@ def test_examples_run(tmp_path, monkeypatch):
     write_spec(tmp_path, SPECIFICATION).rename("small.toml")
     for name, command in commands_of():
         if name == "read":
-            solver = highspy.Highs()
-            solver.readModel("files/skew.milp-mccormick.mps")
-            solver.run()
-            solver.writeSolution("skew.sol", 0)
+            by_highs("files/skew.milp-mccormick.mps", "skew.sol")
         if name not in {"run", "studio"}:
             program, *arguments = shlex.split(command.epilog.removeprefix("Example: "))
             assert (program, invoke(arguments)) == ("crossfield", 0), name

@@ -52,19 +52,8 @@ def test_baron_solves_its_file_to_the_optimum(formulation, width, tmp_path):
     heavier = replace(problem, instance=replace(problem.instance, stroke_coefficient=1.0000001))
     with pytest.raises(cf.SolutionError, match=r"res\.lst: is of another problem"):
         cf.read_solution(tmp_path / "res.lst", heavier)
-    cf.write(problem, tmp_path / "model.nl")
-    assert solution.objective == pytest.approx(scip_optimum(tmp_path / "model.nl"), rel=2e-4, abs=1e-6)
-
-
-def scip_optimum(path):
-    import pyscipopt
-
-    scip = pyscipopt.Model()
-    scip.hideOutput()
-    scip.readProblem(str(path))
-    scip.setParam("limits/gap", 1e-4)
-    scip.optimize()
-    return scip.getObjVal()
+    optimum = cf.solve(problem, "scip", limits=cf.Limits(60.0)).objective
+    assert solution.objective == pytest.approx(optimum, rel=2e-4, abs=1e-6)
 
 
 TYPES = {

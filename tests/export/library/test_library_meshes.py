@@ -1,13 +1,12 @@
 """Meshes in a library: next to a drawing, built, verified, shown, and answers to their files read back."""
 
 import csv
-import gzip
 import io
 import shutil
 
 import crossfield as cf
-import highspy
 import pytest
+from answers import by_highs
 from libraries import defects, document, improve, library_of
 
 SPEC = """formulations = ["exact", "milp", "qp", "cycle"]
@@ -66,13 +65,7 @@ def test_sidecar_table_and_page_state_faces_for_meshes_and_pixels_for_grids(buil
 def test_an_optimum_and_a_proof_of_a_mesh_come_back(built, tmp_path):
     lib, sent = shutil.copytree(built.folder, tmp_path / "lib"), tmp_path / "sent"
     sent.mkdir()
-    model = tmp_path / "model.mps"
-    model.write_bytes(gzip.decompress((lib / f"{DISC}_qp.mps.gz").read_bytes()))
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", False)
-    highs.readModel(str(model))
-    highs.run()
-    highs.writeSolution(str(sent / f"{DISC}_qp.sol"), 0)
+    by_highs(lib / f"{DISC}_qp.mps.gz", sent / f"{DISC}_qp.sol")
     proof = cf.prove(cf.read_instance(lib / f"{DISC}.instance.json"), work=500, jobs=1)
     cf.write_certificate(proof, sent / "proof.npz")
     improved, refused = improve(lib, sent)

@@ -5,8 +5,8 @@ import re
 import shutil
 
 import crossfield as cf
-import highspy
 import pytest
+from answers import by_highs
 from children import complaints
 from crossfield.export.cli.app import invoke
 from crossfield.export.library.documents import check_point
@@ -31,16 +31,8 @@ def proof(opened):
 def answer(opened, tmp_path_factory):
     """A solution of HiGHS of an entry of the library: more digits than its own options leave."""
     path = tmp_path_factory.mktemp("answer") / f"{MILP}.sol"
-    highs = highspy.Highs()
-    for option, value in (
-        ("output_flag", False), ("threads", 1), ("mip_rel_gap", 0.0), ("mip_abs_gap", 0.0),
-        ("mip_feasibility_tolerance", 1e-9), ("primal_feasibility_tolerance", 1e-9)
-    ):  # fmt: skip
-        highs.setOptionValue(option, value)
-    highs.readModel(str(opened / f"{MILP}.mps"))
-    highs.run()
-    highs.writeSolution(str(path), 0)
-    return path
+    exactly = {"mip_feasibility_tolerance": 1e-9, "primal_feasibility_tolerance": 1e-9}
+    return by_highs(opened / f"{MILP}.mps", path, mip_abs_gap=0.0, **exactly)
 
 
 @pytest.fixture

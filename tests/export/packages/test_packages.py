@@ -9,7 +9,8 @@ import crossfield as cf
 import numpy as np
 import pandas as pd
 import pytest
-from instance_kinds import grid
+from instance_kinds import grid, surface
+from meshes import tetrahedron
 
 PACKAGES = [
     "highs",
@@ -26,9 +27,7 @@ def instance_of(domain):
     weights = {"stroke_coefficient": 1.0, "skew_coefficient": 0.1}
     if domain == "grid":
         return grid("///", [0.1, 0.9, 1.2], **weights)
-    corners = [[1.0, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]]
-    mesh = cf.Mesh(corners, [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]])
-    return cf.Instance.on_faces("closed", mesh, [0, 2], [0.4, 1.0], np.ones(2), **weights)
+    return surface(tetrahedron(), [0, 2], [0.4, 1.0], **weights)
 
 
 @cache

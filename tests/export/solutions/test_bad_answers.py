@@ -15,7 +15,7 @@ import crossfield as cf
 import numpy as np
 import places
 import pytest
-from answers import BAD, FILES, GOOD, TINY, WITH_POINT, binary_sol, problem, problem_of
+from answers import BAD, FILES, GOOD, OTHERS, TINY, WITH_POINT, binary_sol, listed, problem, problem_of
 from crossfield.export.solutions.readers import registry
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
@@ -29,9 +29,6 @@ from hypothesis import strategies as st
 from loops import for_each
 
 HERE = places.SOLUTIONS
-OTHERS = sorted(HERE.glob("*.sol"))
-"""Files of HiGHS and of AMPL's solvers."""
-
 FAULTS = {
     "ampl_binary_cut": r"byte 93: the file is cut off",
     "ampl_code_is_a_word": r"line 17: 'objno 0 solved' is not",
@@ -301,12 +298,6 @@ def test_a_repeated_line_of_cbc_drops_no_columns(tmp_path):
 
 
 CUT = "the last line has no end, so the value of"
-
-
-def listed(raw):
-    """Entries of a file: pairs of name and value, or of place and value."""
-    names = range(len(raw.values)) if raw.names is None else raw.names.tolist()
-    return dict(zip(names, raw.values.tolist(), strict=True))
 
 
 def cuts(path, data):

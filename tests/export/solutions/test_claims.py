@@ -7,11 +7,10 @@ import subprocess
 from dataclasses import replace
 
 import crossfield as cf
-import highspy
 import numpy as np
 import places
 import pytest
-from answers import HIGHS_STATES_BOUNDS
+from answers import HIGHS_STATES_BOUNDS, by_highs
 from crossfield.export.cli.app import invoke, read_command
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.grammar import AGREEMENT
@@ -56,18 +55,6 @@ def reading(skew, tmp_path, capsys):
         return code, json.loads(out) if out else {}, err, output.exists()
 
     return run
-
-
-def by_highs(model, answer, gap=0.0, style=0, **options):
-    """Let HiGHS answer a model file."""
-    highs = highspy.Highs()
-    highs.setOptionValue("output_flag", False)
-    highs.readModel(str(model))
-    for name, value in {"mip_rel_gap": gap, "threads": 1, **options}.items():
-        highs.setOptionValue(name, value)
-    highs.run()
-    highs.writeSolution(str(answer), style)
-    return answer
 
 
 # against the point

@@ -6,7 +6,7 @@ import zipfile
 
 import crossfield as cf
 import pytest
-from answers import problem
+from answers import listed, problem
 from crossfield.export.cli.app import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
@@ -130,4 +130,4 @@ def test_tagged_columns_of_gurobi_are_read(model, tmp_path):
         read.write(str(tmp_path / "tagged.json"))
         values = {column.VarName.encode(): column.X for column in read.getVars()}
     raw = read_raw(tmp_path / "tagged.json")
-    assert dict(zip(raw.names.tolist(), raw.values.tolist(), strict=True)) == pytest.approx(values, abs=1e-5)
+    assert listed(raw) == pytest.approx(values, abs=1e-5)

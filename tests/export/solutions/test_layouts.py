@@ -6,7 +6,7 @@ import re
 import crossfield as cf
 import pandas as pd
 import pytest
-from answers import TINY
+from answers import TINY, listed
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw, recognising_readers
 from crossfield.models.text_rows import plain_text
 from loops import for_each
@@ -14,10 +14,6 @@ from loops import for_each
 
 def text(file):
     return (TINY / file).read_bytes()
-
-
-def listed(raw):
-    return dict(zip(raw.names.tolist(), list(raw.values), strict=True))
 
 
 NAMES, VALUES = ["alpha_00_00", "beta_00_00", "p1_00_00_u"], [0.5, -1e-3, 1.0]

@@ -16,6 +16,7 @@ from answers import (
     FILES,
     GOOD,
     OPTIMA,
+    OTHERS,
     PROVEN,
     RELAXATIONS,
     ROUNDED,
@@ -29,8 +30,6 @@ from crossfield.export.solutions.readers.registry import parse_raw, read_raw, re
 from crossfield.export.solutions.readers.siblings import sibling_of
 from loops import for_each
 
-OTHERS = sorted(places.SOLUTIONS.glob("*.sol"))
-"""Files of HiGHS and of AMPL's solvers for problems that are not ours."""
 OPTIMUM = [10, -9.7, 1, 0, 1]
 QP = [0.3499999875, -0.0499999975]
 KEPT = {"optimal-global", "optimal-in-gap", "optimal-local", "infeasible", "unbounded"}

@@ -18,6 +18,7 @@ from crossfield.models.formulations.latex import to_sympy
 from crossfield.models.formulations.lifting import lift_products
 from crossfield.models.formulations.symbols import VARIABLES
 from crossfield.models.instance.angles import HALF, QUARTER
+from instance_kinds import grid
 from loops import for_each
 
 
@@ -146,9 +147,7 @@ def test_violations_are_found(name, block, change, kind, amount, family):
 
 def test_noise_is_left_out_and_small_weights_are_not():
     """Jumps that cancel leave no cost of 1e-16; the format decides on a weight of 1e-13."""
-    instance = cf.Instance.on_pixels(
-        "line", np.ones((1, 3), bool), [[0, 0]], [1e-16], [1.0], skew_coefficient=1e-13
-    )
+    instance = grid("/##", 1e-16, stroke_coefficient=1.0, skew_coefficient=1e-13)
     costs = cf.formulate(instance, "qp-fixed", p=[1, 1]).to_arrays().c
     assert costs[1] == 0  # - pi + pi
     assert np.abs(costs[costs != 0]).min() == pytest.approx(2 * HALF * 2)

@@ -6,6 +6,7 @@ import pytest
 from crossfield.models.instance.angles import line_difference
 from crossfield.models.smooth.polyvector import HOLDS
 from exhaustive import sketch
+from instance_kinds import grid
 from loops import for_each
 from moves import lines
 
@@ -37,9 +38,7 @@ def test_a_hard_hold_keeps_the_strokes():
 def test_one_pixel_under_the_heaviest_strokes_is_solved():
     """Its system has one equation for two unknowns, which a heavy weight must not drown the pull of."""
     for theta in np.linspace(0, 3.1, 40):
-        one = cf.Instance.on_pixels(
-            "one", [[True]], [[0, 0]], [theta], [1.0], stroke_coefficient=1e6, skew_coefficient=0.0
-        )
+        one = grid("/", theta, stroke_coefficient=1e6, skew_coefficient=0.0)
         for hold in HOLDS:
             field = cf.polyvector_field(one, hold=hold)
             assert field.stroke_deviation.max() < 1e-6
