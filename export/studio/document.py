@@ -77,6 +77,7 @@ class Source:
 class Document:
     """Everything that determines field and surface.
 
+    concave: places x, y whose parts are bowls.
     source: the file that was opened. It replaces its strokes as long as they are unchanged.
     """
 
@@ -85,6 +86,7 @@ class Document:
     strokes: tuple[Stroke, ...]
     mask: tuple[MaskEdit, ...]
     hints: tuple[PlacedHint, ...]
+    concave: tuple[tuple[float, float], ...]
     flip: bool
     size: int
     stroke_weight: float
@@ -131,6 +133,7 @@ class Document:
                 PlacedHint(*(hint[key] for key in ("x", "y", "slant", "tilt")))
                 for hint in content.get("hints", ())
             ),
+            concave=tuple((x, y) for x, y in content.get("concave", ())),
             flip=content.get("flip") is True,
             size=int(content["size"]),
             stroke_weight=content.get("stroke_weight", STROKE_WEIGHT),
@@ -138,9 +141,10 @@ class Document:
             source=source if source and source.digest == digest_of(strokes) else None,
         )
         numbers = [document.stroke_weight, *document.weights, *(edit.radius for edit in document.mask)]
-        if not np.isfinite(
-            [*numbers, *(number for hint in document.hints for number in astuple(hint))]
-        ).all():
+        numbers += [
+            number for place in (*map(astuple, document.hints), *document.concave) for number in place
+        ]
+        if not np.isfinite(numbers).all():
             raise InputError("a number of the session is not finite; save it again")
         if sum(len(stroke.points) for stroke in document.strokes) > MAX_SEGMENTS:
             raise InputError(f"the drawing has more than {MAX_SEGMENTS} points; simplify it")

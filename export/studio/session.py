@@ -26,7 +26,7 @@ from ...models.sketch.drawing_file import Drawing, parse_drawing
 from ...models.sketch.parallels import leave_out_parallels
 from ...models.sketch.read import drop_silhouette, find_mask, instance_of_mask
 from ...models.smooth.bend import surface_field
-from ...models.surface.hints import Hint
+from ...models.surface.hints import Hint, pixel_at
 from ...models.surface.lift import surface
 from ...models.surface.surface import Surface
 from ..pictures.underlay import Underlay, parse_underlay, underlay_of_curves
@@ -200,22 +200,17 @@ def compute_field(document: Document, size: int | None = None) -> tuple[DrawnIns
 
 def hints_on_mask(document: Document, instance: Instance) -> list[Hint]:
     """The hints of a document at pixels of the mask; those outside have no effect."""
-    hints = []
-    for hint in document.hints:
-        x, y = instance.origin
-        row, column = (int(np.floor(v / instance.pixel_size)) for v in (hint.y - y, hint.x - x))
-        height, width = instance.mask.shape
-        if 0 <= row < height and 0 <= column < width and instance.mask[row, column]:
-            hints.append(Hint(row, column, np.radians(hint.slant), np.radians(hint.tilt)))
-    return hints
+    placed = ((pixel_at(hint.x, hint.y, instance), hint) for hint in document.hints)
+    return [Hint(*pixel, np.radians(hint.slant), np.radians(hint.tilt)) for pixel, hint in placed if pixel]
 
 
 def compute_surface(document: Document, field: CrossField) -> Surface:
     """The surface of a document's field, with its hints. Raises OvertakenError."""
     hints, flip = tuple(hints_on_mask(document, field.instance)), document.flip
+    concave = tuple(place for place in document.concave if pixel_at(*place, field.instance))
     return _SURFACES.get_or_compute(
-        (field.instance.sha256, hints, flip),
-        lambda: surface(field, hints, flip=flip, stop=is_stopped),
+        (field.instance.sha256, hints, flip, concave),
+        lambda: surface(field, hints, flip=flip, concave=concave, stop=is_stopped),
     )
 
 

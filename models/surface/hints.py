@@ -78,14 +78,21 @@ def check_hints(hints: Iterable[Hint], instance: Instance) -> None:
 
 def find_pixels(places: Iterable[tuple[float, float]], instance: Instance) -> list[tuple[int, int]]:
     """Row and column at places in the drawing. Raises InputError for one outside the mask."""
-    pixels, mask = [], instance.mask
+    pixels = []
     for x, y in places:
-        column, row = np.floor((np.array([x, y]) - instance.origin) / instance.pixel_size)
-        if not (0 <= row < len(mask) and 0 <= column < len(mask[0]) and mask[int(row), int(column)]):
+        pixel = pixel_at(x, y, instance)
+        if pixel is None:
             place = f"the place ({x:g}, {y:g}) lies outside the mask of {instance.name}"
             raise InputError(f"{place}; give one inside, in the coordinates of the drawing")
-        pixels.append((int(row), int(column)))
+        pixels.append(pixel)
     return pixels
+
+
+def pixel_at(x: float, y: float, instance: Instance) -> tuple[int, int] | None:
+    """Row and column at a place in the drawing; None outside the mask."""
+    column, row = np.floor((np.array([x, y]) - instance.origin) / instance.pixel_size)
+    is_on_grid = 0 <= row < instance.grid.height and 0 <= column < instance.grid.width
+    return (int(row), int(column)) if is_on_grid and instance.mask[int(row), int(column)] else None
 
 
 def hint_rows(hint: Hint, level: GridLevel) -> Residuals:

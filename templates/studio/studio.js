@@ -223,7 +223,8 @@ function doubts() {
   if (some.length) item(some.length === 1 ? "1 stroke crosses lines that cross each other. Probably it is not a curvature line, or is hidden." : `${some.length} strokes cross lines that cross each other. Probably they are not curvature lines, or are hidden.`,
     action(some.length === 1 ? "Select it" : "Select them", () => select(some)), action(some.length === 1 ? "Mark as cut" : "Mark as cuts", () => { select(some); mark("cut"); }));
   for (const text of settled ? surface.doubts : []) item(`Surface: ${text}.`);
-  for (const choice of settled ? surface.freedom : []) item(`Your choice: ${choice.text}.`, ...choice.kind === "side" ? [action("Flip", flip)] : []);
+  for (const choice of settled ? surface.freedom : []) item(`Your choice: ${choice.text}.`, choice.kind === "side" ? action("It is a bowl", () => commit({ concave: [...bowls(), [choice.x, choice.y]] }))
+    : action("Take another depth", () => commit({ hints: [...state.doc.hints, hintOf(choice)] })));
   if (!items.length) items.push(element("li", settled ? "None." : field && isDetermined() ? "Not computed yet." : "The field is not determined yet."));
   $("#doubts").replaceChildren(...items);
 }
@@ -233,7 +234,7 @@ function controls() {
   const { doc, history, chosen } = state;
   $("#undo").disabled = !history.can(-1); $("#redo").disabled = !history.can(1); $("#delete").disabled = $("#copy").disabled = !chosen.size; $("#paste").disabled = !state.copied.length;
   showNext();
-  $("#unhint").disabled = !doc.hints.length; $("#flip").setAttribute("aria-pressed", doc.flip);
+  $("#unhint").disabled = !doc.hints.length && !bowls().length; $("#flip").setAttribute("aria-pressed", doc.flip);
   $("#selected").textContent = chosen.size ? `${chosen.size} selected` : "";
   if (document.activeElement !== $("#name")) $("#name").value = doc.name;
   $("#size").value = doc.size; $("#size-value").textContent = `${doc.size} pixels`;
@@ -266,7 +267,10 @@ function paste() {
 const chosenStrokes = () => state.history.now.strokes.filter((_, k) => state.chosen.has(k));
 const counted = strokes => strokes.length === 1 ? "1 stroke" : `${strokes.length} strokes`;
 const fingersDraw = () => state.fingers ?? true;
+const bowls = () => state.doc.concave ?? [];
+const hintOf = ({ x, y, hint }) => ({ x, y, slant: hint.slant, tilt: hint.tilt });
 function flip() {
+  if (bowls().length) { commit({ concave: [] }); return; }
   if (state.surface) state.surface = mirrored(state.surface);
   commit(doc => ({ ...doc, flip: !doc.flip, hints: doc.hints.map(hint => ({ ...hint, tilt: (hint.tilt + 360) % 360 - 180 })) }));
 }
@@ -456,7 +460,7 @@ async function download(what) {
 function dialog(title, ...content) { $("#dialog h2").textContent = title; $("#dialog div").replaceChildren(...content); $("#dialog").showModal(); }
 const actions = {
   undo: () => step(-1), redo: () => step(1), save, flip, copy, paste, delete: remove, retry: request, dismiss: () => banner(""),
-  open: () => $("#file").click(), unhint: () => commit({ hints: [] }),
+  open: () => $("#file").click(), unhint: () => commit({ hints: [], concave: [] }),
   empty: () => { if (mayReplace()) replace({ ...emptyDocument(), page: canvasPage(), size: state.doc.size }); },
   fingers: () => { state.fingers = !fingersDraw(); clear("fingers"); controls(); },
   help: () => dialog("Help", $("#help").content.cloneNode(true)),

@@ -86,6 +86,15 @@ def test_a_session_from_the_first_stroke_to_the_saved_file(empty, tmp_path):
     find(browser, "#undo").click()
     assert pixels(settled(browser)) == whole
 
+    (bowl,) = (
+        each for each in browser.find_elements("css selector", "#doubts button") if "bowl" in each.text
+    )
+    bowl.click()
+    assert len(document(settled(browser))["concave"]) == 1
+    assert "bowl" not in find(browser, "#doubts").text
+    find(browser, "#unhint").click()
+    assert document(settled(browser))["concave"] == []
+
     drag(browser, [(240, 300), (240, 240)], "#surface")
     (hint,) = document(browser)["hints"]
     assert hint["tilt"] == 90

@@ -15,7 +15,15 @@ from crossfield.export.studio.document import Document
 from crossfield.export.studio.files import download
 from crossfield.export.studio.next_step import find_next_step
 from crossfield.export.studio.opening import open_drawing
-from crossfield.export.studio.session import IN, LEFT_OUT, STROKE, hints_on_mask, read_drawn
+from crossfield.export.studio.session import (
+    IN,
+    LEFT_OUT,
+    STROKE,
+    compute_field,
+    compute_surface,
+    hints_on_mask,
+    read_drawn,
+)
 from crossfield.export.studio.views import field_step, surface_step
 from crossfield.models.sketch.samples import sample_svg
 from loops import for_each
@@ -49,6 +57,7 @@ def click(x, y):
         ({"strokes": [{"points": [1, 2], "mark": "dashed"}]}, "mark"),
         ({"strokes": [7]}, r"strokes\[0\]"),
         ({"hints": [{"x": 1, "y": 1, "slant": 95, "tilt": 0}]}, "slant"),
+        ({"concave": [[1]]}, "concave"),
         ({"stroke_weight": float("nan")}, "not finite"),
         ({"picture": 7}, "picture"),
         ({"file": {"name": "a.curves"}}, "file"),
@@ -161,6 +170,16 @@ def test_hints_are_placed_on_pixels_and_those_outside_are_left_out():
     (hint,) = hints_on_mask(session, instance)
     column, row = ((np.array([30, 25]) - instance.origin) / instance.pixel_size).astype(int)
     assert (hint.column, hint.row) == (column, row)
+
+
+def test_a_bowl_is_the_surface_inside_out_and_beyond_the_mask_it_has_no_effect():
+    heights = {}
+    for place in ([60, 50], [-9, 500]):
+        session = document(concave=[place])
+        _, field = compute_field(session)
+        heights[place[0]] = compute_surface(session, field).heights
+    np.testing.assert_allclose(heights[60], -heights[-9], atol=1e-9)
+    assert np.nanmax(np.abs(heights[60])) > 0.1
 
 
 def suspects(strokes):
