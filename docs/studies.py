@@ -5,7 +5,6 @@ The pages state when each study ran, and at which commit its program stands.
 
 from __future__ import annotations
 
-import re
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
 from statistics import mean
@@ -178,34 +177,6 @@ def proofs() -> str:
     )
 
 
-def surfaces() -> str:
-    """Summary of the errors of known surfaces and of the doubts about drawings."""
-    known, trust, sides = (read_rows(f"surface/{name}.csv") for name in ("known", "trust", "sides"))
-    bend = [row for row in known if row["crosses"] == "bend"]
-    errors = [float(row["mean error"]) for row in bend if row["size"] == "48"]
-    right = [row["right side"] == "1.0" for row in known if row["crosses"] != "power"]
-    undoubted = {
-        way: max(float(row["mean error"]) for row in known if (row["crosses"], row["doubts"]) == (way, "0"))
-        for way in ("bend", "greedy", "polyvector")
-    }
-    worst = ", ".join(f"{error:.1f} degrees from a `{way}` field" for way, error in undoubted.items())
-    doubts: dict[str, bool] = defaultdict(bool)
-    for row in trust:
-        doubts[re.sub(r"(_rasterized)?\.\w+$", ".", row["drawing"])] |= bool(row["doubts"])
-    own, others = ([doubt for name, doubt in doubts.items() if ("." in name) == by] for by in (False, True))
-    ranks = [float(row["rank correlation of confidence"]) for row in bend]
-    even = [row["right side"] == "1.0" for row in sides]
-    return f"""\
-- **Good on clean nets of curvature lines.** On {len(errors)} known surfaces at 48 pixels, normals from
-  `bend` fields have mean errors of {span(errors, 1)} degrees.
-- **Poor on most drawings by others.** crossfield [flags](#confidence-and-doubts) {sum(others)} of
-  {len(others)} of their surfaces, and {sum(own)} of {len(own)} of our samples.
-- **No doubt is no guarantee.** Known surfaces without doubts have mean errors of up to {worst}.
-- **The side is a guess.** It is right in {sum(right)} of {len(right)} cases on known surfaces, but for
-  catenoids and saddle sheets, which look alike inside out, in {sum(even)} of {len(even)} views.
-- **`confidence` hardly shows errors**: its rank correlation with them is {span(ranks, 1)}."""
-
-
 def meshes() -> str:
     """Sentences on greedy and best known fields of meshes."""
     rows = {row["mesh"]: row for row in read_rows("meshes/energies.csv")}
@@ -235,5 +206,4 @@ def texts() -> Iterator[tuple[str, str, str]]:
     yield "evidence.md", "hour", hours_of_solvers()
     yield "mathematics.md", "cycles", cycles()
     yield "proofs.md", "proofs", proofs()
-    yield "surface.md", "summary", surfaces()
     yield "notebooks/mesh.md", "findings", meshes()
