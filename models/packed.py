@@ -17,7 +17,7 @@ from .memory import available_memory
 MOST_PER_BYTE: Final = 200
 """Largest content of a packed byte. A list of a million columns at 0 reaches 81 with xz, its JSON 65."""
 
-SMALL: Final = 1 << 20
+_SMALL: Final = 1 << 20
 """Content that any file may have, however well it is packed."""
 
 _COPIES: Final = 10  # of a text, in memory while it is read
@@ -36,7 +36,7 @@ def unpack(data: bytes, most: int, remedy: str = "pack less into it") -> bytes:
     Raises InputError for a file that is damaged, or whose content exceeds `most` bytes, the usual content of
     so many packed bytes, or the memory to read it; `remedy` completes the message.
     """
-    limit, free = min(most, SMALL + MOST_PER_BYTE * len(data)), available_memory()
+    limit, free = min(most, _SMALL + MOST_PER_BYTE * len(data)), available_memory()
     content = unpack_start(data, limit + 1)
     if len(content) > limit:
         raise InputError(f"unpacks to more than {limit} bytes, which is suspicious or too much; {remedy}")

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Final, Literal
 
 import typer
 
-from ...models.processes.job_counts import MOST
+from ...models.processes.job_counts import MOST_JOBS
 
 # Literal names, because help loads no tables; tests/export/cli/test_help.py compares them.
 _SOLVERS: Final = "gurobi, cplex, xpress, highs, scip, baron, ipopt, bonmin, gams-cplex, cbc, glpk"
@@ -24,7 +24,7 @@ _method = partial(typer.Option, "-m", "--method", metavar="NAME")
 _formulation = partial(_formulating, "-f", "--formulation", metavar="NAME")
 _time_limit = partial(typer.Option, "--time-limit", min=0.1, metavar="SECONDS")
 _gap = partial(typer.Option, "--gap", min=0.0)
-_jobs = partial(typer.Option, "--jobs", min=1, max=MOST)
+_jobs = partial(typer.Option, "--jobs", min=1, max=MOST_JOBS)
 
 
 def _norm_option(option: str, terms: str) -> Any:
@@ -422,7 +422,9 @@ SkewWeight = Annotated[
 Processes = Annotated[int, _jobs(help="Number of processes that work in parallel.")]
 Threads = Annotated[
     int,
-    typer.Option("--threads", min=0, max=MOST, help="Threads of HiGHS and of the search; 0: they choose."),
+    typer.Option(
+        "--threads", min=0, max=MOST_JOBS, help="Threads of HiGHS and of the search; 0: they choose."
+    ),
 ]
 
 # Pictures and surfaces

@@ -16,7 +16,7 @@ from ...models.processes.deadline import IsOver, never
 from .session import OvertakenError
 from .views import load_module
 
-KINDS: Final = ("fields", "surfaces", "files")
+_KINDS: Final = ("fields", "surfaces", "files")
 _MOST_TABS: Final = 100  # whose newest edits are remembered
 
 
@@ -29,9 +29,9 @@ class Desk(AbstractContextManager["Desk"]):
 
     def __init__(self) -> None:
         """Create the processes; each starts with its first call."""
-        self._children = {kind: Child(one_thread=True, remedy="choose a smaller size") for kind in KINDS}
+        self._children = {kind: Child(one_thread=True, remedy="choose a smaller size") for kind in _KINDS}
         self._closed = False
-        self._threads = {kind: ThreadPoolExecutor(1) for kind in KINDS}
+        self._threads = {kind: ThreadPoolExecutor(1) for kind in _KINDS}
         self._newest: OrderedDict[str, int] = OrderedDict()
         self._lock = threading.Lock()
         for kind in ("fields", "surfaces"):  # the first edit should not wait for imports
@@ -44,7 +44,7 @@ class Desk(AbstractContextManager["Desk"]):
     def close(self) -> None:
         """End all processes, whatever they are doing; calls that wait for them fail."""
         self._closed = True
-        for kind in KINDS:
+        for kind in _KINDS:
             self._children[kind].close()
             self._threads[kind].shutdown()
 

@@ -28,7 +28,7 @@ EditKind = Literal["paint", "erase", "toggle"]
 FORMAT: Final = "crossfield-studio"
 VERSION: Final = 1
 SIZES: Final = (8, 256)  # least and most pixels of the longer side that the page offers
-FARTHEST: Final = 1e6  # coordinates
+_FARTHEST: Final = 1e6  # coordinates
 PICTURE_SIDE: Final = 1600  # most pixels of the longer side of the picture under the strokes
 MOST_SENT: Final = 12_000_000  # bytes of an opened file that is sent with requests
 
@@ -218,8 +218,8 @@ def _read_points(value: Any, where: str) -> Floats:
         points = np.array(value, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
         points = np.empty(0)
-    if points.ndim != 1 or not len(points) or len(points) % 2 or not (np.abs(points) <= FARTHEST).all():
-        raise InputError(f"{where} of the session: points must be x, y, x, y, ... up to {FARTHEST:g}")
+    if points.ndim != 1 or not len(points) or len(points) % 2 or not (np.abs(points) <= _FARTHEST).all():
+        raise InputError(f"{where} of the session: points must be x, y, x, y, ... up to {_FARTHEST:g}")
     return points.reshape(-1, 2)
 
 

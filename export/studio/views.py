@@ -21,7 +21,7 @@ from .meetings import find_suspects
 from .next_step import find_next_step
 from .session import DrawnInstance, OvertakenError, compute_field, compute_outline, compute_surface
 
-SIDE: Final = 640  # pixels, about, of the longer side of the grid in a shaded picture
+_SIDE: Final = 640  # pixels, about, of the longer side of the grid in a shaded picture
 _MOST_SIDE: Final = 8000  # pixels of a page with a small drawing, of which the page gets a part
 _RIM: Final = 2  # pixels of the grid round it that the picture shows: strokes may be wide
 _FINE: Final = 32767  # steps of a part of a normal: 8 bits would show as bands
@@ -126,6 +126,6 @@ def _view_on_page(document: Document, instance: Instance) -> View:
     """The pixels of a picture of the page that show the grid."""
     x, y, width, height = grid_box(instance)
     rim = _RIM * instance.pixel_size
-    side = round(SIDE * max(document.page[2:]) / max(width, height))
+    side = round(_SIDE * max(document.page[2:]) / max(width, height))
     page = view_of_box(document.page, max(1, min(side, _MOST_SIDE)))
     return page.around((x - rim, y - rim, width + 2 * rim, height + 2 * rim))

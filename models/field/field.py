@@ -29,7 +29,7 @@ of stroke and skew terms (mixed).
 DEGENERATE: Final = np.radians(2.5)  # lines closer than 5 degrees count as one: |beta| > pi/4 - DEGENERATE
 FAR: Final = np.radians(10)  # A stroke that deviates more than this from both lines counts as not followed
 NARROW: Final = QUARTER  # lines that are less than this apart are a narrow cross
-MOST: Final = 0.9  # share of the stroke pixels that deviate no more than `Shape.most_deviation`
+_MOST: Final = 0.9  # share of the stroke pixels that deviate no more than `Shape.most_deviation`
 _EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
 _TIE: Final = 1e-3  # relative to pi/4: what |A| may exceed it by before another jump is the nearest one
 _ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
@@ -255,7 +255,7 @@ class CrossField(Pictured):
         deviation = self.stroke_deviation if len(self.instance.theta) else np.zeros(1)
         return Shape(
             mean_deviation=float(deviation.mean()),
-            most_deviation=float(np.quantile(deviation, MOST)),
+            most_deviation=float(np.quantile(deviation, _MOST)),
             far_strokes=float(np.mean(deviation > FAR)),
             narrow_pixels=float(np.mean(self.angle_between < NARROW - _EQUAL)),
         )

@@ -7,14 +7,14 @@ from typing import Final
 
 from ..errors import InputError
 
-MOST: Final = max(16, 2 * (os.cpu_count() or 1))
+MOST_JOBS: Final = max(16, 2 * (os.cpu_count() or 1))
 """Most threads or processes: beyond twice the cores there is no gain, and each takes memory."""
 
 
 def check_jobs(count: int, name: str = "jobs", *, least: int = 1) -> int:
     """The number of threads or processes. Raises InputError if it is out of range."""
-    if not least <= count <= MOST or count % 1:
-        raise InputError(f"{name} must be between {least} and {MOST}, got {count}")
+    if not least <= count <= MOST_JOBS or count % 1:
+        raise InputError(f"{name} must be between {least} and {MOST_JOBS}, got {count}")
     return count
 
 

@@ -22,7 +22,7 @@ from ..instance.domain import Bools, Floats
 from .colour import PAPER, REDDISH, ink_of, redness
 from .cover import Box, Cover, Covers, Frame, block_means
 from .paper import Ink, relative_to_paper
-from .sheet import SIDE, PhotographedSheet, find_sheet
+from .sheet import SEARCHED_SIDE, PhotographedSheet, find_sheet
 
 FORMATS: Final = ("PNG", "JPEG", "WEBP", "TIFF", "BMP", "GIF", "PPM")
 """Formats that Pillow decodes by itself, without starting other programs."""
@@ -166,7 +166,7 @@ def read_bitmap(data: bytes, size: int) -> Bitmap:
     pages = getattr(image, "n_frames", 1) if image.format in _PAGED else 1
     width, height = image.size
     # The sheet must not depend on the size, so that all grids are on one page.
-    factor = -(-max(width, height) // SIDE)
+    factor = -(-max(width, height) // SEARCHED_SIDE)
     sheet = find_sheet(_reduce_image(image, factor), factor, image.size)
     reduction = max(1, max(width, height) // max(_WORKING_SIDE, _ENOUGH * size))
     pixels = _reduce_image(image, reduction)

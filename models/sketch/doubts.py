@@ -10,7 +10,7 @@ from ..instance.domain import Bools
 from .cover import Frame
 from .outline import THICK
 
-BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
+_BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
 CROWDED: Final = 0.1  # least share of the solved pixels in blocks filled by strokes that causes a warning
 LOOSE: Final = 0.08  # least share of stroke pixels that bound nothing, which causes a warning
 
@@ -44,7 +44,7 @@ def describe_crowding(filled: Bools, mask: Bools, frame: Frame) -> str | None:
     """The largest place filled by strokes, which leave no room between them."""
     from scipy import ndimage
 
-    label, count = ndimage.label(ndimage.binary_opening(filled & mask, np.ones((BLOCK, BLOCK))))
+    label, count = ndimage.label(ndimage.binary_opening(filled & mask, np.ones((_BLOCK, _BLOCK))))
     size = np.bincount(label.ravel(), minlength=count + 1)
     size[0] = 0
     if size.max() < max(CROWDED * mask.sum(), 1):

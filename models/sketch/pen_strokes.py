@@ -27,8 +27,8 @@ from .labels import LabelMatcher
 _GREATEST: Final = 1e9
 CURVES_START: Final = re.compile(rb"v[ \t]+\d+[ \t]*[\r\n]")
 """First line of a .curves file; a mesh, whose vertices begin with v as well, has three numbers there."""
-SIDE: Final = 1000.0  # longer side of the projected drawing, in the units of its page
-BORDER: Final = 40.0  # empty border of the page round it
+_SIDE: Final = 1000.0  # longer side of the projected drawing, in the units of its page
+_BORDER: Final = 40.0  # empty border of the page round it
 VIEWS: Final = {"front": (0.0, 0.0), "side": (90.0, 0.0), "top": (0.0, 90.0)}
 """Directions of views: azimuth, from z towards x, and elevation, in degrees."""
 
@@ -84,8 +84,8 @@ def read_curves(data: bytes, view: str | None = None) -> Curves:
     longer = float((most - least).max())
     if longer == 0:
         raise InputError("draws no stroke: everything is one point, seen from there")
-    placed = [BORDER + SIDE * ((stroke - least) / longer) for stroke in flat]
-    width, height = np.ceil(SIDE * ((most - least) / longer)) + 2 * BORDER
+    placed = [_BORDER + _SIDE * ((stroke - least) / longer) for stroke in flat]
+    width, height = np.ceil(_SIDE * ((most - least) / longer)) + 2 * _BORDER
     return _curves_of_polylines(
         placed, np.arange(len(placed), dtype=np.int32), (0.0, 0.0, float(width), float(height))
     )

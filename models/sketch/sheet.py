@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..instance.domain import Bools, Floats
 
-SIDE: Final = 640  # most pixels on the longer side of a picture that is searched for a sheet
+SEARCHED_SIDE: Final = 640  # most pixels on the longer side of a picture that is searched for a sheet
 _SMALLEST: Final = 64  # pixels on the shorter side of a picture that may be a photograph
 _LEAST: Final = 0.12  # of the picture: area of a sheet
 _MOST: Final = 0.985

@@ -15,7 +15,7 @@ from ..input_limits import MAX_DEPTH, MAX_ELEMENTS, MAX_LAYERS
 from ..instance.domain import Floats
 from .cover import Box
 from .svg_elements import HREFS, tag_of
-from .visible import SIDE, PaintedShape
+from .visible import RENDERED_SIDE, PaintedShape
 
 _EASY: Final = 100  # layers of the size of the page that are drawn at full resolution
 _LEAST_SIDE: Final = 256  # pixels on the longer side of a picture
@@ -59,7 +59,7 @@ def choose_side(root: Element, window: Box, shapes: Sequence[PaintedShape]) -> i
         elif element not in efforts and element not in around:
             around.add(element)
             stack += [(element, True), *((part, False) for part in inner)]
-    return max(_LEAST_SIDE, round(SIDE * min(1.0, math.sqrt(_EASY / max(layers, 1.0)))))
+    return max(_LEAST_SIDE, round(RENDERED_SIDE * min(1.0, math.sqrt(_EASY / max(layers, 1.0)))))
 
 
 def _box_of(shape: PaintedShape, window: Box) -> Floats:

@@ -23,7 +23,7 @@ from .colour import PAPER
 from .cover import Box, Indices
 from .curves import cut_cubics, evaluate_cubics, run_numbers
 
-SIDE: Final = 1024  # pixels on the longer side of the pictures
+RENDERED_SIDE: Final = 1024  # pixels on the longer side of the pictures
 _LEAST_WIDTH: Final = 3.0  # pixels; thinner strokes are widened, so that each has pixels at its centre line
 _STEP: Final = 1.5  # pixels between two samples of a centre line
 _MOST_SAMPLES: Final = 4_000_000

@@ -15,7 +15,7 @@ from ..instance.domain import Bools, Floats, Ints
 from ..instance.grid import Grid
 from ..smooth.polyvector import roots
 
-SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
+_SMALL: Final = 500  # most pixels of the coarsest level, where all starts are tried
 SLOPES: Final = np.array([[-0.5, 0.5, -0.5, 0.5], [0.5, 0.5, -0.5, -0.5]])
 """Weights of the four values of a 2 x 2 block, row by row, in the derivatives by x and y at its centre."""
 _DOME: Final = 0.7  # height of a dome, relative to a half sphere
@@ -184,6 +184,6 @@ class GridLevel:
 def levels_of(level: GridLevel) -> list[GridLevel]:
     """The level and coarser ones, the coarsest first."""
     levels = [level]
-    while levels[0].grid.size > SMALL:
+    while levels[0].grid.size > _SMALL:
         levels.insert(0, levels[0].coarsen())
     return levels

@@ -16,7 +16,7 @@ from .stencils import Crosses, Stencils, corners_of_blocks
 
 OFF: Final = np.radians(10)  # lines whose angle in space deviates more from a right angle do not fit
 UNFIT: Final = 0.3  # share of misfit crosses from which a surface is doubted (docs/surface.md)
-FLAT: Final = np.radians(10)  # mean slant below which a surface is called flat
+_FLAT: Final = np.radians(10)  # mean slant below which a surface is called flat
 
 _PLAIN: Final = Weights(even=0.0, facing=0.0)
 
@@ -45,7 +45,7 @@ def doubts_of(off: Floats, slant: Floats) -> tuple[str, ...]:
         "no one surface has all these curvature lines. Lines are missing, or some strokes are not curvature "
         "lines or are hidden": unfit > UNFIT,
         f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
-        "lines that cross at right angles everywhere do not determine a shape": slant.mean() < FLAT,
+        "lines that cross at right angles everywhere do not determine a shape": slant.mean() < _FLAT,
     }
     return tuple(doubt for doubt, holds in conditions.items() if holds)
 

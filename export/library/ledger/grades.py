@@ -26,7 +26,7 @@ from .ledger import Record
 Difficulty = Literal["easy", "hard", "open"]
 
 EASY: Final = 60.0  # seconds
-PROVEN: Final = (1e-6, 1e-9)  # greatest gap of an optimal point: relative part, absolute part
+_PROVEN: Final = (1e-6, 1e-9)  # greatest gap of an optimal point: relative part, absolute part
 ACCEPTED_VIOLATION: Final = 1e-8  # greatest violation of a point that a library accepts
 _LIFT: Final = 1e-6  # by which the tolerances of solvers may lift a bound above the optimum
 SAME: Final = 1e-9  # objectives this close, relative to their size or absolute, are the same
@@ -51,12 +51,12 @@ def is_better(objective: float, known: float) -> bool:
 
 def is_proven(objective: float, bound: float) -> bool:
     """Whether a dual bound proves a point of that objective optimal."""
-    return objective - bound <= PROVEN[0] * abs(objective) + PROVEN[1]
+    return objective - bound <= _PROVEN[0] * abs(objective) + _PROVEN[1]
 
 
 def relative_gap(objective: float, bound: float) -> float:
     """Return objective minus bound over the objective's size, between 0 and 1."""
-    return min(max(objective - bound, 0.0) / max(abs(objective), PROVEN[1]), 1.0)
+    return min(max(objective - bound, 0.0) / max(abs(objective), _PROVEN[1]), 1.0)
 
 
 def best_runs(records: Iterable[Record], entry: str) -> list[Record]:

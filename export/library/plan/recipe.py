@@ -25,7 +25,7 @@ from ...formats.registry import FORMATS, problem_in_format
 from ...solvers_table import smallest_problem
 from .spec import Rung, Sketch, Spec
 
-LONGEST: Final = 32  # characters of a name before its suffix
+_LONGEST: Final = 32  # characters of a name before its suffix
 _OF_SKETCH: Final = ("kind", "what", "title", "origin", "added")
 NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
 
@@ -108,9 +108,9 @@ def plan_library(spec: Spec) -> tuple[InstanceRecipe, ...]:
         for recipe in _instances(sketch, rung, spec.formulations)
     ]
     longest = max((entry.name for recipe in recipes for entry in recipe.entries), key=len, default="")
-    if len(longest) > LONGEST:
+    if len(longest) > _LONGEST:
         raise InputError(
-            f"the name {longest} has {len(longest)} characters; shorten the sketch's name to reach {LONGEST}"
+            f"the name {longest} has {len(longest)} characters; shorten the sketch's name to reach {_LONGEST}"
         )
     for name, count in Counter(recipe.name for recipe in recipes).items():
         if count > 1:

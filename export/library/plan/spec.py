@@ -34,7 +34,7 @@ FORMAT: Final = "crossfield-library-spec"
 VERSION: Final = 1
 RUNGS: Final = ("tiny", "small", "medium", "large", "mesh")
 OF_MESHES: Final = ("large", "mesh")  # rungs that take meshes, which are on the last one by default
-PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by default: most take a second
+_PROVEN: Final = ("tiny", "small")  # rungs with proofs of 2-norm optima by default: most take a second
 ORIGIN: Final = ("author", "license", "source")
 MOST_SEEDS: Final = 100_000  # of a sketch: each one becomes many files
 SketchKind = Literal["sample", "file", "random", "mesh"]
@@ -277,7 +277,7 @@ def _read_rung(name: str, table: dict[str, Any], formulations: tuple[str, ...]) 
         _check_words(table.get(key, ()), key.removesuffix("s"), known, f"rungs.{name}.{key}")
     # No certificate is about fixed jumps.
     proven = [formulation for formulation in formulations if FORMULATIONS[formulation].minimises != AT_JUMPS]
-    stated: dict[str, Any] = {"prove": name in PROVEN}
+    stated: dict[str, Any] = {"prove": name in _PROVEN}
     stated |= {key: tuple(value) if isinstance(value, list) else value for key, value in table.items()}
     stated["sizes"] = _whole_numbers(table.get("sizes", ()))
     stated["tightened"] = _full_names(table.get("tightened", ()), proven, f"rungs.{name}.tightened")

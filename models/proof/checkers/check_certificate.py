@@ -53,13 +53,14 @@ MOST_SIDE = 9999
 MOST_CUTS = 1200  # numbers that describe the pieces of the boxes
 MOST_PARTS = 8  # of a piece
 MOST_COUNT = 4096  # labels of a pixel in alpha, and in beta
-MOST_LABELS = 1 << 28  # of a level
-MOST_ANGLE = 16.0
+MOST_OF_LEVEL = 1 << 28  # of a level
+FARTHEST_LABEL = 16.0  # radians
 MOST_JUMP = 64
 MOST_WEIGHT = 1e6
 MOST_UNIT = 1.0  # of a share or a table
-SIDE, BLOCK = 40, 1 << 16  # rows and columns of a large product, and numbers, that NumPy handles at once
-SMALL = 1 << 19  # terms of a product up to which leaving some out costs more than it saves
+TILE = 40  # rows and columns of a large product that NumPy handles at once
+TILE_NUMBERS = 1 << 16  # and numbers
+FEW_TERMS = 1 << 19  # terms of a product up to which leaving some out costs more than it saves
 
 PARTS = (
     "head", "instance_head", "instance_origin", "instance_mask", "instance_stroke_pixels", "instance_theta",
@@ -539,8 +540,8 @@ def level_of(arrays: dict[str, Array], number: int, terms: EnergyTerms) -> Level
     h = float(take_array(arrays, f"{at}h", "<f8", 1)[0])
     require(1e-5 <= h <= QUARTER + SLIVER, f"{at}h", "is no spacing")
     alpha, beta = (take_array(arrays, f"centre_{name}", "<f8", n) for name in ("alpha", "beta"))
-    require(np.abs(alpha) <= MOST_ANGLE, "centre_alpha", "is too large")
-    require(np.abs(beta) <= MOST_ANGLE, "centre_beta", "is too large")
+    require(np.abs(alpha) <= FARTHEST_LABEL, "centre_alpha", "is too large")
+    require(np.abs(beta) <= FARTHEST_LABEL, "centre_beta", "is too large")
     if terms.norm != 2:  # section 9: one lattice for all pixels
         require(h * round(HALF / h) == HALF, f"{at}h", "does not divide pi/2")
         require(terms.norm == 1 or h <= HALF / 8, f"{at}h", "is too wide")
@@ -549,10 +550,10 @@ def level_of(arrays: dict[str, Array], number: int, terms: EnergyTerms) -> Level
     ranges = take_array(arrays, f"{at}ranges", "<i4", n, 4).astype(np.int64)
     least, shapes = ranges[:, ::2], ranges[:, 1::2]
     require(((shapes >= 2) & (shapes <= MOST_COUNT)).all(axis=1), f"{at}ranges", "has no cell, or too many")
-    require((h * (np.abs(least) + shapes) <= MOST_ANGLE).all(axis=1), f"{at}ranges", "leads too far away")
+    require((h * (np.abs(least) + shapes) <= FARTHEST_LABEL).all(axis=1), f"{at}ranges", "leads too far away")
     counts = shapes.prod(axis=1)
     labels = int(counts.sum())
-    require(labels <= MOST_LABELS, f"{at}ranges", "has too many labels in all")
+    require(labels <= MOST_OF_LEVEL, f"{at}ranges", "has too many labels in all")
     bits = np.unpackbits(take_array(arrays, f"{at}allowed", "|u1", (labels + 7) // 8), count=labels).astype(
         bool
     )
@@ -712,18 +713,18 @@ def min_plus_product(left: Array, right: Array) -> Array:
     Of a large product, some rows and columns are computed at a time, without the terms k that are nowhere
     there less than the best one of its row.
     """
-    if left.size * right.shape[1] <= SMALL:
+    if left.size * right.shape[1] <= FEW_TERMS:
         return _min_plus_block(left, right)
-    product, begins = np.empty((len(left), right.shape[1])), np.arange(0, right.shape[1], SIDE)
+    product, begins = np.empty((len(left), right.shape[1])), np.arange(0, right.shape[1], TILE)
     all_least, all_most = (end.reduceat(right, begins, axis=1).T for end in (np.minimum, np.maximum))
-    for low in range(0, len(left), SIDE):
-        rows = left[low : low + SIDE]
+    for low in range(0, len(left), TILE):
+        rows = left[low : low + TILE]
         for begin, least, most in zip(begins.tolist(), all_least, all_most):
             best = (rows + least).argmin(axis=1)
             enough = rows[np.arange(len(rows)), best] + most[best]
             some = (rows + least <= enough[:, None]).any(axis=0)
-            part = right[some, begin : begin + SIDE]
-            product[low : low + SIDE, begin : begin + SIDE] = _min_plus_block(rows[:, some], part)
+            part = right[some, begin : begin + TILE]
+            product[low : low + TILE, begin : begin + TILE] = _min_plus_block(rows[:, some], part)
     return product
 
 
@@ -735,7 +736,7 @@ def _min_plus_block(left: Array, right: Array) -> Array:
     columns, right = np.ascontiguousarray(left.T)[:, :, None], np.ascontiguousarray(right)[:, None, :]
     least, many = (
         np.full((left.shape[0], right.shape[2]), np.inf),
-        max(1, BLOCK // (len(left) * right.shape[2])),
+        max(1, TILE_NUMBERS // (len(left) * right.shape[2])),
     )
     for k in range(0, len(right), many):
         np.minimum(least, (columns[k : k + many] + right[k : k + many]).min(axis=0), out=least)

@@ -30,7 +30,7 @@ FORMAT, VERSION = "crossfield-orthogonal-certificate", 3
 HALF, QUARTER, MARGIN = base.HALF, base.QUARTER, base.ROUNDING * base.PRECISION
 min_plus = base.min_plus_product
 RELATIVE = 1e-9
-FLAT = 1e-8  # radians; instances take smaller turns between frames as 0
+LEAST_TURN = 1e-8  # radians; instances take smaller turns between frames as 0
 MOST_LEVELS, MOST_DIVISIONS = 64, 10_000  # of a certificate; cells of a quarter turn
 STRIDE = 4 * MOST_DIVISIONS  # between keys of labels of two points
 MOST_MEMORY = 1 << 33  # bytes for a level, of whatever file
@@ -41,10 +41,10 @@ MOST_TABLES = 1 << 22  # of a level: sums of so many 32-bit numbers are exact in
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
 COLUMNS = 64  # of an inverse, at once
 MOST_STAGES = 64  # of charges
-BLOCK = 1 << 19  # of links from their clouds at once
+LINKS_AT_ONCE = 1 << 19  # of links from their clouds at once
 MOST_CASES = 256  # of integers after the last level
-MOST_ANGLE = 1e3  # of a centre and of the angles of a case
-FARTHEST = 1e30  # coordinates, potentials and prices
+FARTHEST_CENTRE = 1e3  # of a centre and of the angles of a case
+MOST_NUMBER = 1e30  # coordinates, potentials and prices
 THINNEST = 1e-12  # height of a face relative to its longest edge
 DECIMALS = 12  # of kappa
 TURNS = np.arange(-3, 4)  # by which an integer may differ from that of the centre
@@ -56,7 +56,7 @@ PARTS = (
 )  # fmt: skip
 OF_MESH = ("instance_vertices", "instance_faces", "instance_stroke_faces", "kappa")
 OF_GRID = ("instance_origin", "instance_mask", "instance_stroke_pixels")
-WEIGHTS = "instance_pair_weights"  # also, unless all are 1
+PAIR_WEIGHTS = "instance_pair_weights"  # also, unless all are 1
 INDICES, POTENTIAL = "instance_indices", "potential"  # also, where indices are prescribed
 LOOPS = ("loop_start", "loop_row", "loop_sign", "stages")  # also, or none of them
 STAGE_PARTS = {  # of charges, with their kinds; the first four have a number for each loop
@@ -106,9 +106,9 @@ class CentredRows:
             n, kappa = len(white), np.zeros(len(first))
             wrong = kappa
         m, weight = len(first), np.ones(len(first))
-        if WEIGHTS in arrays:
-            weight = base.take_array(arrays, WEIGHTS, "<f8", m)
-        base.require((weight > 0) & (weight <= base.MOST_WEIGHT), WEIGHTS, "is not in (0, 1e6]")
+        if PAIR_WEIGHTS in arrays:
+            weight = base.take_array(arrays, PAIR_WEIGHTS, "<f8", m)
+        base.require((weight > 0) & (weight <= base.MOST_WEIGHT), PAIR_WEIGHTS, "is not in (0, 1e6]")
         theta, of_strokes = base.strokes_of(arrays, head, point)
         self.size, self.pairs, self.first = n, m, np.concatenate([first, point])
         self.second = np.concatenate([second, np.full(len(point), n)])
@@ -121,7 +121,7 @@ class CentredRows:
         self.most = np.full(len(self.limit), QUARTER + RELATIVE) if len(self.turns) else self.limit
         self.slack = math.fsum(self.weight[:m] * (HALF + wrong) * wrong)  # |r| is at most pi/4
         self.centre = np.append(base.take_array(arrays, "centre", "<f8", n), 0.0)
-        base.require(np.abs(self.centre) <= MOST_ANGLE, "centre", "is too large")
+        base.require(np.abs(self.centre) <= FARTHEST_CENTRE, "centre", "is too large")
         self.reach = (self.reach_of(self.centre) + np.abs(self.shift)) * (1 + np.abs(self.shift))
         self.half = np.append(base.take_array(arrays, "half", "|u1", n), 0).astype(np.int64)
         base.require(self.half <= np.where(self.fixed, 0, 1), "half", "is not 0, or 1 at a point not fixed")
@@ -136,7 +136,7 @@ class CentredRows:
             return held, np.zeros(count), 0.0
         potential, weight = base.take_array(arrays, POTENTIAL, "<f8", size), np.where(held, self.weight, 1.0)
         shift = np.bincount(row, sign * potential[ring], count) / weight
-        base.require(np.abs(shift) <= MOST_ANGLE, POTENTIAL, "shifts a residual too far")
+        base.require(np.abs(shift) <= FARTHEST_CENTRE, POTENTIAL, "shifts a residual too far")
         sums = np.bincount(ring, sign * self.offset[row], size) + HALF * self.turns
         constant = 2 * math.fsum(potential * sums) - math.fsum(weight * shift * shift)
         reach = np.bincount(ring, np.abs(self.offset)[row], size) + HALF * np.abs(self.turns)
@@ -174,7 +174,7 @@ def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, A
     point = base.take_array(arrays, "instance_stroke_faces", "<i4", None).astype(np.int64)
     n, v = len(faces), len(vertices)
     base.require(n > 0, "faces", "are none")
-    base.require(np.abs(vertices) <= FARTHEST, "vertices", "is too far away")
+    base.require(np.abs(vertices) <= MOST_NUMBER, "vertices", "is too far away")
     base.require((faces >= 0) & (faces < v), "faces", "names no vertex")
     base.require((point >= 0) & (point < n), "stroke_faces", "is no face")
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -195,7 +195,7 @@ def pairs_of_mesh(arrays: dict[str, Array]) -> tuple[int, Array, Array, Array, A
     one, other = (np.arctan2((y[f] * along).sum(axis=1), (x[f] * along).sum(axis=1)) for f in ends)
     turn = np.round(np.remainder(other - one + np.pi, 2 * np.pi) - np.pi, DECIMALS)
     kappa = base.take_array(arrays, "kappa", "<f8", len(edge))
-    wrong = np.abs(kappa - np.where(np.abs(turn) < FLAT, 0.0, turn))
+    wrong = np.abs(kappa - np.where(np.abs(turn) < LEAST_TURN, 0.0, turn))
     wrong = np.minimum(wrong, np.abs(wrong - 2 * np.pi))
     base.require((np.abs(kappa) <= 4) & (wrong < 1.1 * 10.0**-DECIMALS), "kappa", "is not that of the mesh")
     return n, *ends, kappa, point, wrong
@@ -625,7 +625,7 @@ def cases_bound(rows: CentredRows, turns: Array, angles: Array) -> float:
         r = rows.residuals(angle) + HALF * z
         force = 2 * rows.weight * r
         slope = np.bincount(rows.first, force, rows.size + 1) - np.bincount(rows.second, force, rows.size + 1)
-        at = np.nonzero((np.abs(r) > QUARTER - FLAT) & (len(rows.turns) > 0))[0]
+        at = np.nonzero((np.abs(r) > QUARTER - LEAST_TURN) & (len(rows.turns) > 0))[0]
         normal = np.zeros((rows.size + 1, len(at)))
         normal[rows.first[at], np.arange(len(at))] = np.sign(r[at])
         normal[rows.second[at], np.arange(len(at))] = -np.sign(r[at])
@@ -725,7 +725,7 @@ class Clouds:
         meet = covered[0] & (covered[1] | (charges.around(covered[1].astype(float)) > 0))
         base.require(~meet, "clouds", "of both signs meet")
         around = np.zeros(len(cell))
-        block = max(BLOCK // int(np.diff(charges.begin).max(initial=1)), 1)
+        block = max(LINKS_AT_ONCE // int(np.diff(charges.begin).max(initial=1)), 1)
         for begin in range(0, len(cell), block):
             part = slice(begin, begin + block)
             degree = charges.begin[cell[part] + 1] - charges.begin[cell[part]]
@@ -794,7 +794,7 @@ def charges_bound(arrays: dict[str, Array], rows: CentredRows, threshold: float)
         base.require(price[links[0]] == price[links[1]], "price", "differs at a link")
         base.require(charges.closed | (price == 0), "price", "is not 0 at a border")
         for name, numbers in (("potential", potential), ("price", price)):  # what overflows excludes all
-            base.require(np.abs(numbers) <= FARTHEST, name, "is too large")
+            base.require(np.abs(numbers) <= MOST_NUMBER, name, "is too large")
         base.check_room(rows.taken + 200 * (len(cell) + int(most.sum())), rows.memory)
         clouds = Clouds(charges, most, start, cell, weight)
         bound, added, kind = stage_of(charges, clouds, potential, price)
@@ -853,7 +853,7 @@ def check_arrays(
     if divisions:
         turns = possible_turns(level, squares)
     angles = base.take_array(arrays, "cases", "<f8", None, rows.size)
-    base.require(np.abs(angles) <= MOST_ANGLE, "cases", "is too large")
+    base.require(np.abs(angles) <= FARTHEST_CENTRE, "cases", "is too large")
     least = max(*bounds, cases_bound(rows, turns, angles), charges_bound(arrays, rows, threshold))
     proven = max(0.0, min(least, energy - error) - rows.slack)
     bound = max(0.0, proven - base.SPARE * (1 + proven))
@@ -866,7 +866,7 @@ def check_arrays(
 def check_names(arrays: dict[str, Array], levels: int) -> None:
     """Raise UnreadableError unless the arrays are exactly those of a certificate with so many levels."""
     of_domain = OF_MESH if "instance_faces" in arrays else OF_GRID
-    more = {WEIGHTS} & arrays.keys()
+    more = {PAIR_WEIGHTS} & arrays.keys()
     more |= {INDICES, POTENTIAL} if INDICES in arrays else set()
     if "loop_start" in arrays:
         stages = range(stage_count(arrays))
@@ -896,7 +896,9 @@ def energy_of(arrays: dict[str, Array], rows: CentredRows) -> tuple[float, float
     r[:m] += HALF * p
     (ring, row, sign), wrong = rows.steps, "has other sums along the rings of prescribed indices"
     base.require(np.bincount(ring, sign * p[row], len(rows.turns)) == rows.turns, "p", wrong)
-    base.require(np.abs(r[rows.held]) <= QUARTER + FLAT, "alpha", "is too far from neighbours at an index")
+    base.require(
+        np.abs(r[rows.held]) <= QUARTER + LEAST_TURN, "alpha", "is too far from neighbours at an index"
+    )
     turns = np.round((rows.centre[:-1] - alpha) / HALF)
     same = p - turns[rows.first[:m]] + turns[rows.second[:m]] == rows.nearest[:m]
     return math.fsum(rows.weight * r * r), MARGIN * float(np.sum(rows.weight * (1 + r * r))), same

@@ -9,7 +9,7 @@ import crossfield as cf
 import pytest
 from children import descendants
 from crossfield.models.processes.child_program import WorkerError
-from crossfield.models.processes.job_counts import MOST, check_jobs, cores
+from crossfield.models.processes.job_counts import MOST_JOBS, check_jobs, cores
 from crossfield.models.processes.process_pool import parallel_map, process_pool
 
 
@@ -110,9 +110,9 @@ def test_a_file_where_the_user_happens_to_be_is_not_run(tmp_path, monkeypatch):
 
 def test_how_many_may_be_asked_for_is_said():
     assert check_jobs(1) == 1
-    assert check_jobs(MOST) == MOST >= 16
-    for count in (0, -1, MOST + 1, 100000):
-        with pytest.raises(cf.InputError, match=f"jobs must be between 1 and {MOST}, got {count}"):
+    assert check_jobs(MOST_JOBS) == MOST_JOBS >= 16
+    for count in (0, -1, MOST_JOBS + 1, 100000):
+        with pytest.raises(cf.InputError, match=f"jobs must be between 1 and {MOST_JOBS}, got {count}"):
             check_jobs(count)
     with pytest.raises(cf.InputError, match="got 100000"), parallel_map(abs, 100000):
         pass
