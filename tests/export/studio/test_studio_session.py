@@ -173,13 +173,10 @@ def test_hints_are_placed_on_pixels_and_those_outside_are_left_out():
 
 
 def test_a_bowl_is_the_surface_inside_out_and_beyond_the_mask_it_has_no_effect():
-    heights = {}
-    for place in ([60, 50], [-9, 500]):
-        session = document(concave=[place])
-        _, field = compute_field(session)
-        heights[place[0]] = compute_surface(session, field).heights
-    np.testing.assert_allclose(heights[60], -heights[-9], atol=1e-9)
-    assert np.nanmax(np.abs(heights[60])) > 0.1
+    sessions = [document(concave=[place]) for place in ([60, 50], [-9, 500])]
+    bowl, dome = (compute_surface(each, compute_field(each)[1]).heights for each in sessions)
+    np.testing.assert_allclose(bowl, -dome, atol=1e-9)
+    assert np.nanmax(np.abs(bowl)) > 0.1
 
 
 def suspects(strokes):
