@@ -88,7 +88,7 @@ def _is_end(line: Floats) -> Bools:
 
 def _thin_crowds(values: Floats) -> Ints:
     """Numbers of rows, all but those with _CROWD others before them in the same unit cell."""
-    cell = np.unique(np.floor(values), axis=0, return_inverse=True)[1]
+    cell = np.unique(np.floor(values), axis=0, return_inverse=True)[1].ravel()  # NumPy 2.0 adds an axis
     order = np.argsort(cell, kind="stable")
     rank = np.arange(len(order)) - np.searchsorted(cell[order], cell[order])
     return order[rank < _CROWD].astype(np.int32)

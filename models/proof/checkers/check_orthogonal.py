@@ -86,7 +86,7 @@ class CentredRows:
 
     Prescribed indices (Lemma 10) add `constant` to the energy and shift residuals by shift (r,), 0 where a
     row is not held (r,). steps (3, t): ring, row and direction along the rings of these indices. turns (k,):
-    the sums of integers there. most (r,): of |r| in levels, pi/4 with prescribed indices.
+    the sums of integers there.
     """
 
     def __init__(
@@ -118,7 +118,6 @@ class CentredRows:
         self.held, self.shift, self.constant = self._shift_residuals(arrays)
         self.rings, self.fixed = rings_of(arrays, first, second), self._fixed_points()
         self.limit = limits_of(self) if limit is None else limit
-        self.most = np.full(len(self.limit), QUARTER + RELATIVE) if len(self.turns) else self.limit
         self.slack = math.fsum(self.weight[:m] * (HALF + wrong) * wrong)  # |r| is at most pi/4
         self.centre = np.append(base.take_array(arrays, "centre", "<f8", n), 0.0)
         base.require(np.abs(self.centre) <= FARTHEST_CENTRE, "centre", "is too large")
@@ -285,12 +284,12 @@ def rings_of(arrays: dict[str, Array], first: Array, second: Array) -> list[Ring
 
 
 def limits_of(rows: CentredRows) -> Array:
-    """Lemma 1: |r| of every row of an optimal field is at most this, shape (r,), pi/4 where it is held.
+    """Lemma 1: |r| of every row of an optimal field is at most this, (r,); pi/4 with prescribed indices.
 
     Any potential gives a lower bound of a resistance. Here it is a difference of two columns of an inverse.
     """
     count = len(rows.first)
-    if rows.size > MOST_DENSE:
+    if rows.size > MOST_DENSE or len(rows.turns):
         return np.full(count, QUARTER + RELATIVE)
     weight = rows.weight / max(rows.weight.max(initial=0.0), 1e-300)  # the limits do not depend on the unit
     place, start = blocks_of(rows.size, rows.first[: rows.pairs], rows.second[: rows.pairs])
@@ -309,7 +308,6 @@ def limits_of(rows: CentredRows) -> Array:
             drop = potential[ends[0]] - potential[ends[1]]
             power = np.maximum(weight @ (drop * drop), 1e-300)
             share[some] = weight[some] * drop[some, np.arange(len(some))] ** 2 / power
-    share[rows.held] = 0.0
     return QUARTER * np.clip(1 - share * (1 - RELATIVE), 0.0, 1.0) + RELATIVE
 
 
@@ -491,7 +489,7 @@ def costs_of(level: CellLevel) -> Array:
         a = rows.residual[:, None] + h * x
         deducted = np.where((shift == 0) & (np.abs(x) <= 1), np.abs(x), 0.25)
         cost = rows.weight[:, None] * ((a - rows.shift[:, None]) ** 2 - h * h * deducted)
-        within = np.abs(a) <= rows.most[:, None] + h * (1 + RELATIVE)
+        within = np.abs(a) <= rows.limit[:, None] + h * (1 + RELATIVE)
         best = np.where(within, np.minimum(best, cost), best)
     for corner in level.corners():
         usable[corner[level.allowed]] = True
@@ -596,7 +594,7 @@ def possible_turns(level: CellLevel, squares: Array) -> Array:
     rows, table, h = level.rows, level.squares, HALF / level.divisions
     left = squares & np.logical_and(*table.at_ends(table.have_partners(squares)))
     first, second = table.at_ends(h * (level.cells + rows.half[level.owner] / 2))
-    row, reach = table.row[left], rows.most + h * (1 + RELATIVE) + RELATIVE
+    row, reach = table.row[left], rows.limit + h * (1 + RELATIVE) + RELATIVE
     size, reach = rows.residual[row] + (first - second)[left], reach[row]
     possible = (np.abs(size + HALF * turn) - reach <= 0 for turn in TURNS)
     return np.array([np.bincount(row[of_turn], minlength=len(rows.first)) > 0 for of_turn in possible]).T
