@@ -142,10 +142,13 @@ def cascade_of(texts: Iterable[str]) -> Cascade:
     return cascade
 
 
-def _add_rules(cascade: Cascade, rules: Iterable[Any], around: str = "") -> None:
+def _add_rules(cascade: Cascade, rules: list[Any], around: str = "", depth: int = 0) -> None:
     """Add rules, which may be nested in that of a selector. Layers count in the order of the sheet."""
     import tinycss2
 
+    if rules and depth > _DEEPEST:
+        cascade.skipped.append("rules nested too deep")
+        return
     for rule in rules:
         kind = rule.lower_at_keyword if rule.type == "at-rule" else ""
         if rule.type == "qualified-rule":
@@ -155,10 +158,8 @@ def _add_rules(cascade: Cascade, rules: Iterable[Any], around: str = "") -> None
                 text = text.replace("&", f":is({around})") if "&" in text else f":is({around}) {text}"
             if declared := _declared(rule.content):
                 _add_selector(cascade, text, declared)
-            if text.count(":is(") > _DEEPEST:
-                continue
             inner = tinycss2.parse_blocks_contents(rule.content, skip_comments=True, skip_whitespace=True)
-            _add_rules(cascade, [part for part in inner if part.type.endswith("-rule")], text)
+            _add_rules(cascade, [part for part in inner if part.type.endswith("-rule")], text, depth + 1)
         elif kind in ("layer", "supports") or (
             kind == "media" and _text(rule.prelude).lower() in ("", "all", "screen")
         ):
@@ -166,7 +167,8 @@ def _add_rules(cascade: Cascade, rules: Iterable[Any], around: str = "") -> None
             if around:
                 content = f"{around}{{{_text(content)}}}"
                 cascade.count_characters(len(content))
-            _add_rules(cascade, tinycss2.parse_rule_list(content, skip_comments=True, skip_whitespace=True))
+            inner = tinycss2.parse_rule_list(content, skip_comments=True, skip_whitespace=True)
+            _add_rules(cascade, inner, depth=depth + 1)
         elif kind in _STYLING:
             cascade.skipped.append(shortened(f"@{kind} {_text(rule.prelude)}".strip(), 40))
 

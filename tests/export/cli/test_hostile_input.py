@@ -36,7 +36,7 @@ ZIGZAG = "".join(f"L{k % 60} {k % 40}" for k in range(200))
 COSTLY_SVG = {
     **{
         f"style of {text!r}": styled(text * 60_000)
-        for text in ("a", "@", "{", "/*", " ", "(", "a;", "@a{", "\\", '"')
+        for text in ("a", "@", "{", "/*", " ", "(", "a;", "@a{", "@layer{", "a{", "\\", '"')
     },
     "a selector of many": styled(",".join(f".c{k}" for k in range(20_000)) + "{stroke:red}"),
     "uses of one path": drawn(f'<path id="p" stroke="black" d="M0 0{ZIGZAG}"/>' + '<use href="#p"/>' * 400),
@@ -86,14 +86,14 @@ COSTLY_SVG = {
 }  # fmt: skip
 
 
-def archive_with(name, shape, kind, length):
+def archive_with(name, shape, descr, length):
     """An instance in which one array consists of so many zero bytes."""
     arrays = {key: array for key, array in instance_arrays(kind("square")).items() if key != name}
     data = io.BytesIO(pack_arrays(arrays))
     entry = zipfile.ZipInfo(f"{name}.npy")
     entry.compress_type = zipfile.ZIP_DEFLATED
     with zipfile.ZipFile(data, "a") as archive, archive.open(entry, "w") as stream:
-        np.lib.format.write_array_header_1_0(stream, {"descr": kind, "fortran_order": False, "shape": shape})
+        np.lib.format.write_array_header_1_0(stream, {"descr": descr, "fortran_order": False, "shape": shape})
         for _ in range(length >> 20):
             stream.write(bytes(1 << 20))
     return data.getvalue()
