@@ -63,7 +63,9 @@ def whole_numbers(
     values: Any, name: str, error: _ErrorClass = InstanceError
 ) -> np.ndarray[Any, np.dtype[np.int32]]:
     """The values as a new array of int32. Raises the error, with their name, for other numbers."""
-    array = values if getattr(values, "dtype", None) == np.int32 else float_array(values, name, error)
+    if getattr(values, "dtype", None) == np.int32:
+        return np.array(values, np.int32)
+    array = float_array(values, name, error)
     if not ((array >= -(2**31)) & (array < 2**31)).all() or (array != np.floor(array)).any():
         raise error(f"{name} holds something other than whole numbers of 32 bits")
     return array.astype(np.int32)
