@@ -17,7 +17,7 @@ from ...models.sketch.bitmap import Bitmap
 from ...models.sketch.cover import Box, block_means
 from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
-from ...models.sketch.parallels import find_parallels
+from ...models.sketch.parallels import find_non_edges
 from ...models.sketch.thinning import smooth_way, trace_shape
 from .document import MOST_SENT, PICTURE_SIDE, Document, Mark, digest_of, read_strokes
 
@@ -51,9 +51,9 @@ def open_drawing(data: bytes, file_name: str, view: str | None = None) -> dict[s
     if isinstance(drawing, Bitmap):
         page, strokes = _trace_picture(drawing)
     else:
-        is_parallel, parallels = find_parallels(drawing)
-        page, strokes = _strokes_of_curves(drawing, is_parallel)
-        notes += parallels
+        is_left_out, reasons = find_non_edges(drawing)
+        page, strokes = _strokes_of_curves(drawing, is_left_out)
+        notes += reasons
     opened: dict[str, Any] = {
         "name": name_from_text(stem or file_name),
         "page": list(page),

@@ -23,7 +23,7 @@ from ...models.processes.child_program import is_stopped
 from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels, fit_frame
 from ...models.sketch.curves import Curves
 from ...models.sketch.drawing_file import Drawing, parse_drawing
-from ...models.sketch.parallels import leave_out_parallels
+from ...models.sketch.parallels import leave_out_non_edges
 from ...models.sketch.read import drop_silhouette, find_mask, instance_of_mask
 from ...models.smooth.bend import surface_field
 from ...models.surface.hints import Hint, pixel_at
@@ -96,7 +96,7 @@ def _read_source(source: Source) -> Drawing:
 
     def read() -> Drawing:
         drawing = parse_drawing(source.data, Path(source.name).suffix, SIZES[1])
-        return leave_out_parallels(drawing) if isinstance(drawing, Curves) else drawing
+        return leave_out_non_edges(drawing) if isinstance(drawing, Curves) else drawing
 
     return _DRAWINGS.get_or_compute((hashlib.sha256(source.data).digest(), source.name), read)
 

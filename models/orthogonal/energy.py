@@ -67,7 +67,7 @@ class OrthogonalEnergy(RightAngles):
         return replace(energy, sums=sums, turns_along=rings.turns)
 
     @cached_property
-    def held(self) -> Bools:
+    def is_held(self) -> Bools:
         """Whether each row is along a ring of a prescribed index, so that it cannot change alone, (r,)."""
         if self.sums is None:
             return np.zeros(len(self.first), dtype=bool)
@@ -75,7 +75,7 @@ class OrthogonalEnergy(RightAngles):
 
     def keeps_sums(self, rows: Ints, steps: Ints) -> bool:
         """Whether steps (c,) of the integers of rows, each at most once, keep all prescribed sums."""
-        return not self.held[rows].any() or not (self.sums[:, rows] @ steps).any()
+        return not self.is_held[rows].any() or not (self.sums[:, rows] @ steps).any()
 
     def with_sums(self, z: Ints) -> Ints:
         """The integers with the prescribed sums; what a ring lacks goes the shortest way to a free ring."""
@@ -97,7 +97,7 @@ class OrthogonalEnergy(RightAngles):
         free, steps = len(self.turns_along), self.sums.tocoo()
         ends = np.full((2, len(self.first)), free, dtype=np.int32)
         ends[(steps.data < 0).astype(np.intp), steps.col] = steps.row
-        rows = np.nonzero(self.held)[0].astype(np.int32)
+        rows = np.nonzero(self.is_held)[0].astype(np.int32)
         forest = grow_forest(free + 1, ends[0, rows], ends[1, rows], [free])
         return ends, replace(forest, pair=np.append(rows, -1)[forest.pair])
 
@@ -128,7 +128,7 @@ class OrthogonalEnergy(RightAngles):
         negative numbers (Lawson and Hanson 1974).
         """
         free, sides = self.fit_angles(z), np.zeros(len(z))
-        alpha, limited = free, self.held | (self.second == self.size)
+        alpha, limited = free, self.is_held | (self.second == self.size)
         while self.sums is not None:
             residual = self.residuals(alpha, z)
             beyond = np.where(limited & (np.abs(residual) > QUARTER + SLACK), np.sign(residual), 0.0)
@@ -165,7 +165,7 @@ class OrthogonalEnergy(RightAngles):
         return turns
 
     def nearest(self, alpha: Floats) -> Ints:
-        """The integers of least energy at given angles, (r,), changed to the prescribed sums."""
+        """The minimum-energy integers at given angles, (r,), changed to the prescribed sums."""
         return self.with_sums(np.round(self.turns(alpha)).astype(np.int32))
 
     @cached_property
@@ -188,7 +188,7 @@ class OrthogonalEnergy(RightAngles):
         residual: that of the best angles for the present integers; angles follow the step.
         """
         change: Floats = HALF * HALF * self.stiffness - 2 * HALF * self.weight * np.abs(residual)
-        return np.where(self.held, np.inf, change)
+        return np.where(self.is_held, np.inf, change)
 
     def better_steps(self, residual: Floats) -> Ints:
         """The better step of each integer, 1 or -1: against the sign of its residual."""
@@ -227,7 +227,7 @@ class OrthogonalEnergy(RightAngles):
                 z[row] += step
                 residual, total, failed[:] = moved, reached, False
         while self.size > MOST_DENSE and not is_over():
-            steps = np.where(self.held, 0.0, np.round(np.round(residual / HALF, 9)))
+            steps = np.where(self.is_held, 0.0, np.round(np.round(residual / HALF, 9)))
             nearest = z - steps.astype(np.int32)
             moved = self.residuals(self.fit_angles(nearest), nearest)
             if self.total(moved) >= lowered(total):

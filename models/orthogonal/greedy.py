@@ -66,7 +66,7 @@ def find_forest_rows(energy: OrthogonalEnergy) -> Bools:
 
     The forest grows in breadth from the ground, between the points that held rows join.
     """
-    size, held = energy.size + 1, energy.held
+    size, held = energy.size + 1, energy.is_held
     links = coo_array((held[held], (energy.first[held], energy.second[held])), shape=(size, size))
     number = connected_components(links, directed=False)[1].astype(np.int32)
     first, second, alone = number[energy.first], number[energy.second], np.bincount(number)[number] == 1

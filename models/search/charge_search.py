@@ -1,7 +1,7 @@
 """Search for charges of low energy on surfaces without strokes: docs/orthogonal-proofs.md, section 5.
 
 The sums of residuals round all corners determine the energy where there are no handles, and nearly so with
-some. A change of one integer moves a unit to a neighbouring corner; here it moves anywhere.
+some. A change of one integer moves a unit to a neighbouring corner; here a unit can move to any corner.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from scipy.sparse import csr_array, diags_array
 from ..instance.angles import HALF
 from ..instance.domain import Floats, Ints, Rings
 from ..instance.sparse_systems import factor_matrix
-from ..orthogonal.energy import OrthogonalEnergy
+from ..orthogonal.energy import OrthogonalEnergy, lowered
 from ..processes.deadline import IsOver
 
 _PULL: Final = 1e-7  # of the Laplacian, which is singular
@@ -32,8 +32,8 @@ def move_charges(energy: OrthogonalEnergy, rings: Rings, z: Ints, is_over: IsOve
     resistance = diags_array(np.divide(1.0, energy.weight, where=used, out=np.zeros(len(z))))
     inverse = factor_matrix(walks @ resistance @ walks.T, pull=_PULL)(np.eye(count))
     charge = walks @ (energy.constant / HALF + z)
-    own = np.diagonal(inverse)
-    apart = np.round((own[:, None] + own - 2 * inverse) / _UNIT).astype(np.int64)
+    of_unit = np.diagonal(inverse)
+    apart = np.round((of_unit[:, None] + of_unit - 2 * inverse) / _UNIT).astype(np.int64)
     rng, near = np.random.default_rng(0), np.argsort(apart, axis=1, kind="stable")[:, 1 : _NEAR + 1]
     best = _descend(charge, inverse, apart, is_over)
     for _ in range(min(_KICKS, int(_WORK / count**2))):
@@ -46,7 +46,7 @@ def move_charges(energy: OrthogonalEnergy, rings: Rings, z: Ints, is_over: IsOve
             step = np.copysign(1, moved[here])
             moved[[here, there]] -= step, -step
         moved = _descend(moved, inverse, apart, is_over)
-        if moved @ inverse @ moved < (best @ inverse @ best) * (1 - _UNIT):
+        if moved @ inverse @ moved < lowered(float(best @ inverse @ best)):
             best = moved
     turns = np.round(walks @ z + best - charge).astype(np.int32)
     return replace(energy, sums=walks.tocsc(), turns_along=turns).with_sums(z)

@@ -80,8 +80,6 @@ def _explore(
     """The lowest landscape of 500 perturbations; rings: of the rows."""
     if not len(land.p):
         return land
-    least, perturbations = (
-        land.bounded_energy,
-        Perturbations(rings, land.terms.size, land.terms.first, land.terms.second),
-    )
+    perturbations = Perturbations(rings, land.terms.size, land.terms.first, land.terms.second)
+    least = land.bounded_energy
     return explore_from(land, perturbations, rng, least=least, count=_KICKS, is_over=is_over)[0] or land

@@ -26,10 +26,10 @@ _BEYOND: Final = 2  # of these at each end: least part of a line that leaves the
 _BIN: Final = np.radians(2.0)  # of directions; a family takes three neighbouring ones
 
 
-def leave_out_parallels(curves: Curves) -> Curves:
+def leave_out_non_edges(curves: Curves) -> Curves:
     """The curves without hatching, ruled paper and faint lines, and notes on these."""
-    is_parallel, notes = find_parallels(curves)
-    kept = ~is_parallel
+    is_left_out, notes = find_non_edges(curves)
+    kept = ~is_left_out
     return replace(
         curves,
         points=curves.points[kept],
@@ -41,7 +41,7 @@ def leave_out_parallels(curves: Curves) -> Curves:
     )
 
 
-def find_parallels(curves: Curves) -> tuple[Bools, tuple[str, ...]]:
+def find_non_edges(curves: Curves) -> tuple[Bools, tuple[str, ...]]:
     """Which parts of curves (k,) are hatching, ruled paper or faint, and notes on them."""
     first, last, start, way, is_straight = _find_chords(curves)
     chord = vector_length(*way.T)
@@ -50,11 +50,11 @@ def find_parallels(curves: Curves) -> tuple[Bools, tuple[str, ...]]:
     direction = np.round(np.arctan2(way[:, 1], way[:, 0]) / _BIN).astype(int) % bins
     left, top, right, bottom = curves.box
     side = max(right - left, bottom - top)
-    is_parallel = np.zeros(len(first), dtype=bool)
+    is_left_out = np.zeros(len(first), dtype=bool)
     notes = []
     for best in np.argsort(-np.bincount(direction[is_cut], minlength=bins), kind="stable"):
         turn = (direction - best + 1) % bins
-        members = np.flatnonzero(is_cut & (turn <= 2) & ~is_parallel)
+        members = np.flatnonzero(is_cut & (turn <= 2) & ~is_left_out)
         is_long = chord[members] >= _LONG * side
         is_ruled = is_long.sum() >= MANY
         members = members[is_long] if is_ruled else members
@@ -70,23 +70,23 @@ def find_parallels(curves: Curves) -> tuple[Bools, tuple[str, ...]]:
             np.median(apart / np.minimum(chord[members][order][1:], chord[members][order][:-1])) < _BESIDE
         )
         if is_row and (is_ruled or np.median(np.diff(offset[order])) <= _CLOSE * side):
-            is_parallel[members] = True
+            is_left_out[members] = True
             if is_ruled:  # the margin of a page crosses all lines, in any colour
-                is_parallel |= is_straight & (turn == bins // 2 + 1) & (chord >= np.ptp(offset))
+                is_left_out |= is_straight & (turn == bins // 2 + 1) & (chord >= np.ptp(offset))
             x, y = middle.mean(axis=0)
             notes.append(
                 f"{len(members)} parallel lines round ({x:.4g}, {y:.4g}) are left out as hatching or ruled "
                 "paper; if they are curvature lines, mark them as such (in commands: --curvature)"
             )
-    if curves.faint is not None and (is_faint := curves.faint[first] & ~is_parallel).any():
+    if curves.faint is not None and (is_faint := curves.faint[first] & ~is_left_out).any():
         x, y = curves.points[(first + last)[is_faint][0] // 2, 0]
         count = f"{is_faint.sum()} lines are" if is_faint.sum() > 1 else "1 line is"
         notes.append(
             f"{count} much paler or thinner than the others and left out as construction lines, first round "
             f"({x:.4g}, {y:.4g}); if they belong to the object, draw them as strong as the others"
         )
-        is_parallel |= is_faint
-    return np.repeat(is_parallel, last + 1 - first), tuple(notes)
+        is_left_out |= is_faint
+    return np.repeat(is_left_out, last + 1 - first), tuple(notes)
 
 
 def _find_chords(curves: Curves) -> tuple[Indices, Indices, Floats, Floats, Bools]:

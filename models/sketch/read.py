@@ -30,7 +30,7 @@ from .doubts import (
 from .drawing_file import Drawing, parse_drawing, read_file
 from .labels import label_of
 from .outline import find_inside, find_strokes_along_outline, keep_parts_with_strokes
-from .parallels import describe_lines_across, leave_out_parallels
+from .parallels import describe_lines_across, leave_out_non_edges
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
@@ -143,7 +143,7 @@ def instance_of_drawing(
     white: the picture from `read_mask`; without it the mask is the inside of the drawing.
     """
     if isinstance(drawing, Curves):
-        drawing = leave_out_parallels(drawing)
+        drawing = leave_out_non_edges(drawing)
     if white is None:
         frame = fit_frame(drawing.box, size, margin=True)
         covers = drawing.covers(frame)
@@ -184,7 +184,7 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
         raise NoStrokeError("no stroke is left on so coarse a grid; choose a larger size")
     region = find_inside(walls)
     inner, weight = region & ~covers.cuts, covers.lines.weight
-    mask = overshot = keep_parts_with_strokes(inner, weight)
+    mask = reached = keep_parts_with_strokes(inner, weight)
     if isinstance(drawing, Curves):
         mask = keep_parts_with_strokes(inner, np.where(find_overshoots(drawing, inner, frame), 0.0, weight))
     if not mask.any():
@@ -195,7 +195,7 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
         *drawing.notes,
         describe_open_drawing(region),
         describe_lines_across(drawing, region, frame) if isinstance(drawing, Curves) else None,
-        _describe_overshot_parts(overshot & ~mask, frame),
+        _describe_overshot_parts(reached & ~mask, frame),
         describe_loose_strokes(walls, region, frame),
         describe_crowding(covers.filled, mask, frame),
     )
@@ -217,12 +217,8 @@ def find_overshoots(curves: Curves, area: Bools, frame: Frame) -> Bools:
     )
     step = np.diff(curves.curve, prepend=-1, append=-1) != 0
     at = np.concatenate([curves.points[step[:-1], 0], curves.points[step[1:], 3]])
-    x, y = (
-        np.floor((at - (frame.x, frame.y)) / frame.pixel)
-        .astype(int)
-        .clip(0, np.array(area.shape[::-1]) - 1)
-        .T
-    )
+    pixel = np.floor((at - (frame.x, frame.y)) / frame.pixel).astype(int)
+    x, y = pixel.clip(0, np.array(area.shape[::-1]) - 1).T
     deep = (ndimage.distance_transform_edt(area) >= _DEEP)[y, x]
     ends = np.tile(curves.curve[step[:-1]], 2)[deep] * (count + 1) + label[y, x][deep]
     is_end = np.isin(piece, ends) & (size < _OVERSHOOT * np.bincount(owner)[piece // (count + 1)])

@@ -1,4 +1,4 @@
-"""What crosses leave undetermined: the side of each part, and the depth along straight rulings."""
+"""Choices that crosses leave open: the side of each part, and its depth where rulings are straight."""
 
 from __future__ import annotations
 

@@ -94,16 +94,16 @@ def surface(
         level = GridLevel(stencils, crosses, (window[0].start, window[1].start))
         part_hints = [hint for hint in all_hints if part_of[hint.row, hint.column] == number]
         is_bowl = any(part_of[bowl] == number for bowl in bowls)
-        z, other = _solve_part(level, part_hints, is_over, flip=flip or is_bowl)
+        z, another = _solve_part(level, part_hints, is_over, flip=flip or is_bowl)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
         if level.grid.size >= LARGE * instance.grid.size:
             if not (is_bowl or _decide_side(part_hints)):
                 middle = place_of(instance, *find_deepest(part_of == number))
                 freedom.append(Freedom("side", number, level.grid.size, middle))
-            if other and part_of[other.row, other.column] == number:
-                place = place_of(instance, other.row, other.column)
-                freedom.append(Freedom("depth", number, level.grid.size, place, other))
+            if another and part_of[another.row, another.column] == number:
+                place = place_of(instance, another.row, another.column)
+                freedom.append(Freedom("depth", number, level.grid.size, place, another))
     off = right_angle_deviation(field, heights)
     lifted = Surface(field, heights, confidence_of(field, off), (), tuple(freedom))
     slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
@@ -114,7 +114,7 @@ def surface(
 def _solve_part(
     part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool
 ) -> tuple[Floats, Hint | None]:
-    """The heights of least energy, and a normal of another surface with the same crosses if there is one.
+    """The minimum-energy heights, and a normal of another surface with the same crosses if there is one.
 
     All starts are solved on the coarsest level, and the lowest one on all finer ones.
     """
@@ -122,11 +122,11 @@ def _solve_part(
     dome, *planes = ([*_from_start(coarse, z, hints, is_over, flip=flip)] for z in coarse.initial_heights)
     candidates = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
     _, z = min(candidates, key=itemgetter(0))
-    other = find_open_depth(coarse, z, [hint_rows(hint, coarse) for hint in hints])
+    another = find_open_depth(coarse, z, [hint_rows(hint, coarse) for hint in hints])
     for level in finer:
         z = _descend_with_hints(level, level.interpolate(coarse, z), hints, is_over)[1]
         coarse = level
-    return z if hints else _orient(part, z, flip=flip), other
+    return z if hints else _orient(part, z, flip=flip), another
 
 
 def _from_start(

@@ -58,7 +58,7 @@ def charge_arrays(
 ) -> Arrays:
     """The arrays of charges in a certificate; none without rings, or without the time for a first round.
 
-    threshold: as of `Proof`. quick: whether to end after this round.
+    threshold: as of `Proof`. quick: whether to end after the first round.
     """
     arrays = _ring_loops(domain, rows) if len(domain.rings.defect) else {}
     if not arrays or len(arrays["loop_start"]) == 1:

@@ -84,9 +84,9 @@ class CentredRows:
     less than here, because kappa differs from that of the mesh. memory, taken: most bytes for the check, and
     those that it takes without levels.
 
-    Prescribed indices (Lemma 10) add `constant` to the energy and shift residuals by shift (r,), 0 where a
-    row is not held (r,). steps (3, t): ring, row and direction along the rings of these indices. turns (k,):
-    the sums of integers there.
+    Prescribed indices (Lemma 10) add `constant` to the energy, and shift residuals by shift (r,) on the rows
+    of their rings, where is_held (r,) is True. steps (3, t): ring, row and direction along these rings. turns
+    (k,): the sums of integers there.
     """
 
     def __init__(
@@ -115,7 +115,7 @@ class CentredRows:
         self.ends = list(zip(self.first.tolist(), self.second.tolist()))
         self.offset, self.weight = np.concatenate([kappa, -theta]), np.concatenate([2 * weight, of_strokes])
         self.steps, self.turns = rings_of_indices(arrays, np.array([first, second]), kappa)
-        self.held, self.shift, self.constant = self._shift_residuals(arrays)
+        self.is_held, self.shift, self.constant = self._shift_residuals(arrays)
         self.rings, self.fixed = rings_of(arrays, first, second), self._fixed_points()
         self.limit = limits_of(self) if limit is None else limit
         self.slack = math.fsum(self.weight[:m] * (HALF + wrong) * wrong)  # |r| is at most pi/4
@@ -895,7 +895,7 @@ def energy_of(arrays: dict[str, Array], rows: CentredRows) -> tuple[float, float
     (ring, row, sign), wrong = rows.steps, "has other sums along the rings of prescribed indices"
     base.require(np.bincount(ring, sign * p[row], len(rows.turns)) == rows.turns, "p", wrong)
     base.require(
-        np.abs(r[rows.held]) <= QUARTER + LEAST_TURN, "alpha", "is too far from neighbours at an index"
+        np.abs(r[rows.is_held]) <= QUARTER + LEAST_TURN, "alpha", "is too far from neighbours at an index"
     )
     turns = np.round((rows.centre[:-1] - alpha) / HALF)
     same = p - turns[rows.first[:m]] + turns[rows.second[:m]] == rows.nearest[:m]
