@@ -128,6 +128,7 @@ KINDS: Final[dict[str, Callable[[], cf.Instance]]] = {
     "fan-box": lambda: surface(fan(4), [0, 2], gauge="box"),
     "tetrahedron-strokeless": lambda: surface(tetrahedron()),
     "tetrahedron-skewed": lambda: surface(tetrahedron(), [0, 2], orthogonal=False),
+    "sheet-strokes-weightless": lambda: surface(sheet(2, 2), [4, 7], stroke_coefficient=0),
     "cube": lambda: surface(box(), range(12), [0], stroke_coefficient=20),
     "cube-skewed-box": lambda: surface(box(), [1, 4, 6, 11], orthogonal=False, gauge="box"),
     "torus-strokeless": lambda: surface(torus(6, 4)),
