@@ -64,10 +64,12 @@ def keep_better_field(
     *,
     on: Instance,
     value: Callable[[CrossField], float] = lambda field: field.energy().total,
+    also_equal: bool = False,
 ) -> None:
     """Keep an earlier field on an instance if it is better than the one found now, or none is.
 
-    value: what a better field has less of; by default its 2-norm energy.
+    value: what a better field has less of; by default its 2-norm energy. also_equal: whether the earlier one
+    stays, without a notice, if both are equally good.
     """
     earlier = earlier_field(new.folder / name, on)
     if earlier is None:
@@ -75,6 +77,8 @@ def keep_better_field(
     was, found = value(earlier), None if now is None else value(now)
     if found is None or was < found - SAME * (1 + abs(found)):
         notice(kept_notice(name, f"energy {was:.6g}", "no field" if found is None else f"energy {found:.6g}"))
+        new.kept.add(name)
+    elif also_equal and was <= found + SAME * (1 + abs(found)):
         new.kept.add(name)
 
 
