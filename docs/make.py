@@ -211,7 +211,7 @@ def misprints() -> str:
 pixels, and its field has up to {worst:.1f} times the minimum 1-norm energy: where p1 = 0, z is free in an
 interval ([facets.csv](formulations/facets.csv)). With the box, a rotation by 90 degrees changes the optimum
 of {changed} of {len(boxes)} random grids of 2 x 3 pixels ([gauges.csv](formulations/gauges.csv)). HiGHS and
-Bonmin proved these optima (`python docs/make.py errata` at commit b7f5b0ee)."""
+Bonmin proved these optima (`python docs/make.py errata` at commit 99c0d92d)."""
 
 
 def write_gallery() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import csv
 import re
+import subprocess
+from functools import cache
 
 from places import ROOT
 
@@ -31,14 +33,23 @@ def test_links_lead_to_files_and_headings():
 
 
 def test_files_that_pages_name_are_there():
-    """Words like `export/formats/lp.py` or `models/search/`, with NAME for any name."""
+    """Words like `models/search/`, with NAME for any name: now or, in a clone, at a commit in their line."""
     path_like = re.compile(r"(?<![\w./])((?:models|export|templates|tests|docs|\.ci)/[\w./-]*[\w/])")
-    for page, text in TEXTS.items():
-        lines = [line for line in text.splitlines() if not re.search(r"commit [0-9a-f]{8}", line)]
-        named = path_like.findall(re.sub(r"Create\s`[^`]+`", "", "\n".join(lines)))
-        assert [path for path in named if not any(ROOT.glob(path.rstrip("/").replace("NAME", "*")))] == [], (
-            page
-        )
+    texts = [*TEXTS.values(), *(path.read_text() for path in (ROOT / "docs" / "evidence").rglob("*.csv"))]
+    missing = []
+    for line in re.sub(r"Create\s`[^`]+`", "", "\n".join(texts)).splitlines():
+        named = path_like.findall(line)
+        there = {path for path in named if any(ROOT.glob(path.rstrip("/").replace("NAME", "*")))}
+        if commit := re.search(r"commit ([0-9a-f]{8})", line):
+            there |= files_of(commit[1]) if (ROOT / ".git").exists() else {*named}
+        missing += {*named} - there
+    assert missing == []
+
+
+@cache
+def files_of(commit: str) -> set[str]:
+    command = ["git", "ls-tree", "-r", "--name-only", commit]
+    return {*subprocess.check_output(command, cwd=ROOT, text=True).splitlines()}
 
 
 def test_rules_of_formats_that_are_cited_are_in_a_table():

@@ -3,13 +3,8 @@
 import pytest
 from places import ROOT
 
-NEEDS = {
-    "command_pages": "sphinx",
-    "conf": "sphinx",
-    "csv_pages": "sphinx",
-    "formulas": "latex2mathml",
-    "studio_pictures": "selenium",
-}
+NEEDS = dict.fromkeys(("command_pages", "conf", "csv_pages"), "sphinx")
+NEEDS |= {"formulas": "latex2mathml", "studio_pictures": "selenium"}
 """Packages of the extra `docs` that a program needs."""
 
 

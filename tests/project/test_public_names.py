@@ -12,13 +12,8 @@ from crossfield.models import errors
 
 def loaded_after(code):
     """Top-level names of the modules that are loaded after some lines of Python in a fresh process."""
-    command = [
-        sys.executable,
-        "-c",
-        f"import sys\n{code}\nprint(*sorted({{name.split('.')[0] for name in sys.modules}}))",
-    ]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    return set(done.stdout.split())
+    program = f"import sys\n{code}\nprint(*sorted({{name.split('.')[0] for name in sys.modules}}))"
+    return {*subprocess.check_output([sys.executable, "-c", program], text=True).split()}
 
 
 def test_the_public_names_are_there():
@@ -65,9 +60,7 @@ def test_the_reference_describes_every_parameter(name):
     assert len(described) == 2 or not named
     entries = re.findall(r"^([a-z_]\w*(?:, \w+)*)$", described[-1].partition("\n\n")[0], re.MULTILINE)
     listed = {word for entry in entries for word in entry.split(", ")}
-    assert [
-        parameter for parameter in named if not parameter.startswith("_") and parameter not in listed
-    ] == []
+    assert [word for word in named if not word.startswith("_") and word not in listed] == []
 
 
 def test_results_print_on_one_line_with_what_they_are(tmp_path):
