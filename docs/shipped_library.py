@@ -1,4 +1,4 @@
-"""Counts of the library that ships, in its page and its guide (`python docs/make.py library`)."""
+"""Counts of the library that ships, in its page (`python docs/make.py library`)."""
 
 from __future__ import annotations
 
@@ -49,17 +49,14 @@ def span(values: list[int]) -> str:
 def counts(entries: Facts) -> str:
     """Sentences on what the statuses of the entries rest on."""
     instances = len({facts["instance"] for facts in entries})
-    status = Counter(facts["status"] for facts in entries)
     proven = Counter(facts["solved"] for facts in entries)
     certificates = len(list(POINTS.glob("*.certificate.npz")))
     tightened = sum(facts["tightened"] for facts in entries)
     return (
-        f"{len(entries)} entries of {instances} instances; {tightened} are [tightened](#tightened-entries). "
-        f"Their {status['optimal']} proofs are {certificates} certificates, for {proven['certificate']} "
-        f"entries, and the tangent for {proven['tangent']} QPs with fixed jumps. The others are claims: "
-        f"{status['agreed']} entries on which programs of three makers agree, and {status['claimed']} with "
-        f"fewer. {own_claims(entries)} of these rest on one run of `crossfield prove`, whose certificate is "
-        f"not kept. {status['open']} entries are open."
+        f"Of the {len(entries)} entries of {instances} instances, {tightened} are tightened. "
+        f"{certificates} certificates prove {proven['certificate']} entries, and the tangent "
+        f"{proven['tangent']} QPs with fixed jumps. {own_claims(entries)} of the claims rest on one run of "
+        "`crossfield prove`, whose certificate is not kept."
     )
 
 
@@ -97,15 +94,8 @@ def names() -> str:
 
 
 def replace_counts() -> None:
-    """Replace the counts in both pages."""
+    """Replace the counts in the page."""
     entries = [dict(entry.facts) for entry in cf.entries()]
     page = DOCS / "library.md"
     replace_between(page, "shipped", f"{rungs(entries)}\n\n{counts(entries)}")
     replace_between(page, "names", names())
-    instances = {facts["instance"] for facts in entries}
-    replace_between(
-        DOCS / "guides" / "libraries.md",
-        "shipped",
-        f"The specification `default` builds the library that ships: {len(entries)} entries of "
-        f"{len(instances)} instances.",
-    )

@@ -111,7 +111,7 @@ def minlp_quartic() -> Families:
     minimises=TWO_NORM, how="the expanded squares with p1^2 = p1, which holds for binary p1 only",
 )  # fmt: skip
 def minlp_cubic() -> Families:
-    """Expanded, p1^2 replaced by p1: the full model of section 2."""
+    """The full model of section 2, expanded."""
     yield term("smooth", E, CUBIC)
     yield from jump_bounds()
     yield from strokes(norm=2)

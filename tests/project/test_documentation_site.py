@@ -12,6 +12,7 @@ import pytest
 from browsing import served, show, sideways
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.choice import declare
+from crossfield.models.formulations.symbols import p1
 
 pytestmark = pytest.mark.slow
 
@@ -84,14 +85,14 @@ def test_formulas_are_whole_and_inside_the_page(browser, address, site, width):
 
 
 def test_a_model_has_every_term_and_equation_of_its_declaration(browser, address, docs_module):
-    squared = docs_module("make").SQUARED
+    squared, expanded = docs_module("make").SQUARED, docs_module("make").EXPANDED
     browser.get(f"{address}/formulations.html")
     shown = browser.execute_script(
         "return [...document.querySelectorAll('.model')].map(model =>"
         " [model.querySelector('.formula').textContent,"
         "  [...model.querySelectorAll('tbody .equation')].map(cell => cell.textContent)])"
     )
-    names = [name for name in FORMULATIONS if name not in squared]
+    names = [name for name in FORMULATIONS if name not in {**squared, **expanded}]
     for name, (minimised, equations) in zip(names, shown, strict=True):
         declared = declare(name)
         assert len(re.findall(r"∑|\+strokes|\+skew", minimised)) == len(declared.objective), name
@@ -100,6 +101,10 @@ def test_a_model_has_every_term_and_equation_of_its_declaration(browser, address
         both = declare(name), declare(other, stroke_norm=2, beta_norm=2)
         expressions = [[family.expression for family in (*one.objective, *one.rows)] for one in both]
         assert expressions[0] == expressions[1], name
+    for name, other in expanded.items():
+        first, second = declare(name), declare(other)
+        assert first.objective[0].expression == second.objective[0].expression.expanded(p1)
+        assert (first.objective[1:], first.rows) == (second.objective[1:], second.rows)
 
 
 def test_a_link_to_a_csv_file_opens_a_page_with_its_rows(browser, address):
