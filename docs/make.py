@@ -185,9 +185,8 @@ EQUAL = "These minimise the same, and points carry over by name:"
 
 SUPPORT = """`.nl` and GAMS files hold every formulation, and LP and MPS files all except `minlp-parity`:
 `minlp-quartic` and `minlp-cubic` *lifted*, with one column and four rows for each product of an integer and a
-continuous variable, without loss unless relaxed. [solvers.csv](formulations/solvers.csv) states which
-solver takes which formulation (`local`: without proof), and
-[refusals.csv](formulations/refusals.csv) why one does not."""
+continuous variable, without loss unless relaxed. [Which solver takes which](formulations/solvers.csv)
+(`local`: without proof), and [why not](formulations/refusals.csv)."""
 
 
 DIFFERENCES = """\

@@ -24,13 +24,9 @@ TITLES: Final = {
     "mesh": "Meshes",
     "drawing": "Drawings of other programs",
 }
-COLUMNS: Final = {"mesh": "Mesh, and field."}
-"""Heads of the columns of pictures."""
-SHORT: Final = """Use the name of a sample in place of a sketch or mesh:
-
-- `crossfield solve mouse --size 48 --method bend -o out` makes the field of a drawing or computed surface,
-  and `crossfield shade out/mouse.bend.field.npz -o out` the surface;
-- `crossfield solve cube --method search -o out` makes the field of a mesh."""
+SHORT: Final = """Use the name of a sample in place of a sketch or mesh: `crossfield shade mouse --size 48 -o out` computes
+the surface of a drawing, and `crossfield solve cube --method search -o out` the field of a mesh. The
+pictures show drawing, field and surface, or mesh and field."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +84,5 @@ def write_page() -> None:
             first = entry.description.partition(";")[0]
             description = f"{first[0].upper()}{first[1:]}."
             lines.append(f"- ![{entry.name}](pictures/{path.name})\n\n  **`{entry.name}`** {description}")
-        columns = COLUMNS.get(kind, "Drawing, field and surface.")
-        parts += [f"## {title}", columns, "\n".join(lines)]
+        parts += [f"## {title}", "\n".join(lines)]
     (DOCS / "gallery.md").write_text("\n\n".join(parts) + "\n")

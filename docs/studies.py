@@ -112,8 +112,7 @@ def solved_instances() -> str:
             ran[*kind, about[row["instance"]]] += 1
             solved[kind] |= {row["instance"]} if is_solved(row) else set()
     titles = {
-        "cold": "cold", "tightened": "tightened", "free editions": "cold, free commercial editions",
-        "prove": "`prove`, without a file",
+        "cold": "cold", "tightened": "tightened", "free editions": "cold, commercial", "prove": "`prove`",
     }  # fmt: skip
     lines = []
     for formulation in ("milp-mccormick", "miqp-exact"):
@@ -154,7 +153,8 @@ def cycles() -> str:
         f"{len(seconds['scip', 'miqp-cycle', 'False'])} as `miqp-cycle`, and "
         f"{len(seconds['scip', 'miqp-cycle', 'True'])} with limits. HiGHS proves {len(windows)} as "
         f"`milp-orthogonal` and {len(cycle)} as `milp-cycle` (`disc` in {cycle['disc']:.1f} instead of "
-        f"{windows['disc']:.1f} s, `skew 15` in {cycle['skew 15']:.1f} instead of {windows['skew 15']:.1f} s)."
+        f"{windows['disc']:.1f} s, `skew 15` in {cycle['skew 15']:.1f} instead of "
+        f"{windows['skew 15']:.1f} s)."
     )
 
 
