@@ -24,8 +24,9 @@ TITLES: Final = {
     "mesh": "Meshes",
     "drawing": "Drawings of other programs",
 }
-SHORT: Final = """Use the name of a sample in place of a sketch or mesh: `crossfield shade mouse --size 48 -o out` computes
-the surface of a drawing, and `crossfield solve cube --method search -o out` the field of a mesh. The
+SHORT: Final = """\
+Use the name of a sample in place of a sketch or mesh: `crossfield shade mouse --size 48 -o out`
+computes the surface of a drawing, and `crossfield solve cube --method search -o out` the field of a mesh. The
 pictures show drawing, field and surface, or mesh and field."""
 
 
