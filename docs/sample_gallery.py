@@ -69,9 +69,8 @@ def entries() -> list[Entry]:
 def write_page() -> None:
     """Write docs/gallery.md and its thumbnails."""
     import diagrams
-    from make import generated_line
 
-    parts = ["# Gallery", generated_line("python docs/make.py gallery"), SHORT]
+    parts = ["# Gallery", SHORT]
     for kind, title in TITLES.items():
         lines = []
         for entry in (entry for entry in entries() if entry.kind == kind):

@@ -58,5 +58,4 @@ def test_the_four_tutorials_work_as_printed(tmp_path):
             run("-c", code)
         else:
             for line in code.splitlines():
-                words = shlex.split(line)
-                run(*(words[1:] if words[0] == "python" else ["-m", *words]))
+                run("-m", *shlex.split(line))
