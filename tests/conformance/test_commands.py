@@ -6,7 +6,7 @@ import crossfield as cf
 import pytest
 from crossfield.export.cli.app import app, invoke
 from crossfield.export.runs.methods import METHODS
-from instance_kinds import SMALL, crossed, is_provable, kind, on_mesh
+from instance_kinds import SMALL, crossed, first_field, is_provable, kind, on_mesh
 from typer.main import get_command
 
 COMMANDS = {
@@ -54,7 +54,7 @@ def prepared(tmp_path_factory):
     def files(name):
         if name not in known:
             folder = tmp_path_factory.mktemp("kind")
-            instance, field = kind(name), cf.greedy_field(kind(name))
+            instance, field = kind(name), first_field(kind(name))
             problem = cf.formulate(instance, "qp-fixed", p=field.p)
             cf.write(problem, folder / "models", formats=["nl", "lp"], start=field)
             known[name] = {

@@ -9,7 +9,18 @@ import pytest
 from crossfield.models.errors import DomainError
 from hypothesis import given, settings
 from independent_energy import Formulas, angle_in
-from instance_kinds import KINDS, MANY, SMALL, TINY, crossed, instances, is_provable, kind, on_mesh
+from instance_kinds import (
+    KINDS,
+    MANY,
+    SMALL,
+    TINY,
+    crossed,
+    first_field,
+    instances,
+    is_provable,
+    kind,
+    on_mesh,
+)
 
 NORMS = (1, 2, "mixed")
 WORK = 4000
@@ -102,7 +113,7 @@ OF_INTEGERS = [name for name in SMALL if kind(name).orthogonal or on_mesh(kind(n
 
 @pytest.mark.parametrize("name", crossed(OF_INTEGERS, every=3))
 def test_a_search_that_has_to_end_returns_its_best_field(name):
-    first = cf.power_field(kind(name)).energy().total
+    first = np.inf if kind(name).indices is not None else cf.power_field(kind(name)).energy().total
     for questions in (0, 10, 100, 300):
         asked = itertools.count()
         result = cf.search(kind(name), jobs=1, stop=lambda asked=asked, most=questions: next(asked) >= most)
@@ -114,7 +125,7 @@ def test_a_search_that_has_to_end_returns_its_best_field(name):
 
 def assert_order(instance):
     """Bound <= optimum <= search <= greedy, and the search states the energies of its own fields."""
-    greedy = cf.greedy_field(instance).energy().total
+    greedy = first_field(instance).energy().total
     found = cf.search(instance, rounds=1, jobs=1, stop=patience())
     energy = found.field.energy().total
     close = 1e-9 * (1 + greedy)

@@ -13,7 +13,7 @@ from folders import contents
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from independent_energy import Formulas
-from instance_kinds import KINDS, SMALL, crossed, instances, is_provable, kind, on_mesh
+from instance_kinds import KINDS, SMALL, crossed, first_field, instances, is_provable, kind, on_mesh
 
 
 def choices(call, *arguments, **more):
@@ -34,7 +34,9 @@ OF_MESH = {"instance", "crosses"}
 
 
 def any_field(instance):
-    """A field whose lines are anywhere."""
+    """A field whose lines are anywhere, as far as prescribed indices allow that."""
+    if instance.indices is not None:
+        return first_field(instance)
     rng = np.random.default_rng(1)
     u = rng.uniform(0, np.pi, instance.domain.size)
     skew = 0 if instance.orthogonal else rng.uniform(-0.7, 0.7, len(u))

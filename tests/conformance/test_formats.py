@@ -25,7 +25,7 @@ from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.windows import Windows
 from folders import contents
-from instance_kinds import SMALL, grid, kind
+from instance_kinds import SMALL, first_field, grid, kind
 from oracles import by_asl
 from places import GOLDEN
 from pyomo.repn.plugins.nl_writer import NLWriter
@@ -75,7 +75,7 @@ PROBLEMS = [*problems()]
 @cache
 def field_of(place):
     """The greedy field of a kind, whose jumps no single change improves."""
-    return cf.greedy_field(kind(place))
+    return first_field(kind(place))
 
 
 def problem_of(place, formulation, options):

@@ -20,7 +20,7 @@ from folders import contents
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from independent_energy import Formulas
-from instance_kinds import SMALL, TINY, crossed, instances, kind
+from instance_kinds import SMALL, TINY, crossed, first_field, instances, kind
 
 LEAST = 1e-9
 """Least size of a number in a file: readers of files drop smaller ones."""
@@ -30,14 +30,17 @@ FEW = [name for name in TINY if len(kind(name).domain.first) <= 1 and name != "t
 
 
 def problem_of(name, formulation, *, field=None, **options):
-    """The problem, and the greedy field of the instance; None where the instance cannot have it.
+    """The problem, and the first field of the instance; None where the instance cannot have it.
 
-    field: with the jumps of `qp-fixed`, another one than the greedy field.
+    field: with the jumps of `qp-fixed`, another one than the first field.
     """
-    instance, field = kind(name), field or cf.greedy_field(kind(name))
+    instance, field = kind(name), field or first_field(kind(name))
     jumps = {"p": field.p} if formulation == "qp-fixed" else {}
     is_right, is_cycle = (word in formulation for word in ("-orthogonal", "-cycle"))
-    if (is_right or is_cycle) and (not instance.orthogonal or (is_cycle and instance.gauge == "box")):
+    is_refused = (is_right or is_cycle) and (
+        not instance.orthogonal or (is_cycle and instance.gauge == "box")
+    )
+    if is_refused or (instance.indices is not None and not is_cycle):
         with pytest.raises(cf.FormulationError):
             cf.formulate(instance, formulation, **jumps)
         return None, field
@@ -90,8 +93,8 @@ def variants(name, formulation):
     problems = [problem]
     for option in sorted(FORMULATIONS[formulation].option_names):
         if option == "limits":
-            if kind(name).gauge == "box":
-                with pytest.raises(cf.FormulationError, match="gauge"):
+            if kind(name).gauge == "box" or kind(name).indices is not None:
+                with pytest.raises(cf.FormulationError, match=r"gauge|limits"):
                     cf.formulate(kind(name), formulation, limits=True)
                 continue
             field = cf.improved_field(field)  # limits cut off fields that one jump improves

@@ -66,8 +66,11 @@ class Formulas:
         return smooth, self.instance.stroke_coefficient * strokes, self.instance.skew_coefficient * skew
 
     def least(self, norm: int, most: int = MOST_JUMPS) -> float | None:
-        """The least energy of all fields in the norm 1 or 2, by every jump; None where they are many."""
-        if math.prod(map(len, self.jumps)) > most:
+        """The least energy of all fields in the norm 1 or 2, by every jump; None where they are many.
+
+        None, too, where indices are prescribed.
+        """
+        if self.instance.indices is not None or math.prod(map(len, self.jumps)) > most:
             return None
         return min(self.least_at(p, norm) for p in itertools.product(*self.jumps))
 

@@ -98,6 +98,7 @@ KINDS: Final[dict[str, Callable[[], cf.Instance]]] = {
     "full-orthogonal": lambda: grid("/### ##/# #//#", orthogonal=True),
     "full-orthogonal-box": lambda: grid("/### ##/# #//#", orthogonal=True, gauge="box"),
     "parts-orthogonal": lambda: grid("/#.##./ ##.##.#", orthogonal=True),
+    "indices": lambda: grid("/##/ #### /###", orthogonal=True, indices=[(7, 1)]),
     # Strokes
     "contradicting": lambda: grid("/// /// ///", QUARTER * np.array([0, 1, 2, 3, 1e-9, 4 - 1e-9])),
     "contradicting-orthogonal": lambda: grid("/// ///", [0, QUARTER], orthogonal=True),
@@ -131,6 +132,8 @@ KINDS: Final[dict[str, Callable[[], cf.Instance]]] = {
     "sheet-strokes-weightless": lambda: surface(sheet(2, 2), [4, 7], stroke_coefficient=0),
     "cube": lambda: surface(box(), range(12), [0], stroke_coefficient=20),
     "cube-skewed-box": lambda: surface(box(), [1, 4, 6, 11], orthogonal=False, gauge="box"),
+    "cube-indices": lambda: surface(box(), indices=[(2, 1)]),
+    "fan-indices": lambda: surface(fan(5), [0, 2, 3], indices=[(0, 1)]),
     "torus-strokeless": lambda: surface(torus(6, 4)),
     "torus-skewed": lambda: surface(torus(5, 4), [0, 17], orthogonal=False),
     "sheet-weighted": lambda: weighted(surface, sheet(3, 3), [0, 7, 17], draw=7),
@@ -156,6 +159,13 @@ def is_provable(instance: cf.Instance) -> bool:
 def kind(name: str) -> cf.Instance:
     """The instance of a kind, the same object every time."""
     return KINDS[name]()
+
+
+def first_field(instance: cf.Instance) -> cf.CrossField:
+    """A field with the indices that are prescribed, else the greedy one."""
+    return (
+        cf.greedy_field(instance) if instance.indices is None else cf.search(instance, rounds=0, jobs=1).field
+    )
 
 
 MANY: Final = [name for name in KINDS if kind(name).domain.size > 400]

@@ -45,6 +45,7 @@ _SWEEPS: Final = 400  # in which sand topples
 _OVER: Final = 1.5  # relaxation
 _STILL: Final = 1e-7  # excess of sand, in particles, that topples no more
 _LEAST: Final = 1e-5  # background below which sand is not spread thinner
+_ROUNDING: Final = 1e-12  # relative: of the charges of a cloud, far above what a checker deducts
 _DIGITS: Final = 9  # of charges: those that symmetry makes equal are, however a mesh is numbered
 _ROUNDS: Final = 12  # of a stage
 _STEPS: Final = 300  # of gradients for a potential
@@ -176,7 +177,7 @@ class _Stages:
                 laplacian = charges.begin, charges.column, charges.entry, charges.resistance
                 parts.append(_topple(laplacian, room, loop[at : at + _CHUNK], cells))
         count, cell, weight = (np.concatenate(arrays) for arrays in zip(*parts, strict=True))
-        return starts_of(count), cell, weight.astype(np.float32).astype(float)
+        return starts_of(count), cell, weight
 
     def _best_price(self, clouds: Clouds, added: Floats, kind: Indices) -> Floats:
         """The Lagrange multiplier of each loop for the sum of charges in its part, where that is 0."""
@@ -261,6 +262,7 @@ def _topple(
 
     places: the room of each loop, whether clouds may lie there, and whether that of its own particle may.
     most: loops of a cloud. Returns how many loops all clouds have, and these loops, ascending, and weights.
+    A particle has none where its sand does not come to rest, as in a closed part with little room.
     """
     count, place = np.zeros(len(loop), np.int64), np.full(len(places[0]), -1)
     cells, weights = np.empty(len(loop) * most, np.int64), np.empty(len(loop) * most)
@@ -273,12 +275,31 @@ def _topple(
             size, moved = _sweep(laplacian, places, (place, local, numbers), size)
             if moved < _STILL:
                 break
+        for k in range(size):  # as in a certificate
+            numbers[0, k] = float(np.float32(numbers[0, k]))
+        kept = _is_cloud(laplacian, (place, local, numbers), size)
         for j in np.sort(local[:size]):
-            if numbers[0, place[j]] > 0.0:
+            if kept and numbers[0, place[j]] > 0.0:
                 cells[filled], weights[filled] = j, numbers[0, place[j]]
                 filled, count[a] = filled + 1, count[a] + 1
             place[j] = -1
     return count, cells[:filled], weights[:filled]
+
+
+@compiled_inside
+def _is_cloud(laplacian: Laplacian, cloud: Cloud, size: int) -> bool:
+    """Whether a particle less the charges of its cloud is clearly not negative anywhere."""
+    (begin, column, entry, resistance), (place, local, numbers) = laplacian, cloud
+    for k in range(size):
+        i, own = local[k], 1.0 if k == 0 else 0.0
+        rest, reach = own - resistance[i] * numbers[0, k], own + resistance[i] * numbers[0, k]
+        for at in range(begin[i], begin[i + 1]):
+            if place[column[at]] >= 0:
+                rest += entry[at] * numbers[0, place[column[at]]]
+                reach += entry[at] * numbers[0, place[column[at]]]
+        if numbers[0, k] > 0.0 and rest < _ROUNDING * reach:
+            return False
+    return True
 
 
 @compiled_inside
