@@ -1,7 +1,8 @@
 """The specification of a library, read from TOML: sketches, sizes, gauges, seeds, formulations and formats.
 
-docs/library.md describes its keys, and library-spec.schema.json in this folder its form. This module checks
-names in tables, and combinations of keys. Files are relative to the folder of the specification.
+docs/library/specification.csv describes its keys, and library-spec.schema.json in this folder its form.
+This module checks names in tables, and combinations of keys. Files are relative to the folder of the
+specification.
 """
 
 from __future__ import annotations
