@@ -33,7 +33,7 @@ def test_links_lead_to_files_and_headings():
 
 
 def test_files_that_pages_name_are_there():
-    """Words like `models/search/`, with NAME for any name: now or, in a clone, at a commit in their line."""
+    """Words like `models/search/`, NAME being any: now, or in a whole clone at a commit in their line."""
     path_like = re.compile(r"(?<![\w./])((?:models|export|templates|tests|docs|\.ci)/[\w./-]*[\w/])")
     texts = [*TEXTS.values(), *(path.read_text() for path in (ROOT / "docs" / "evidence").rglob("*.csv"))]
     missing = []
@@ -41,15 +41,23 @@ def test_files_that_pages_name_are_there():
         named = path_like.findall(line)
         there = {path for path in named if any(ROOT.glob(path.rstrip("/").replace("NAME", "*")))}
         if commit := re.search(r"commit ([0-9a-f]{8})", line):
-            there |= files_of(commit[1]) if (ROOT / ".git").exists() else {*named}
+            there |= files_of(commit[1]) if has_history() else {*named}
         missing += {*named} - there
     assert missing == []
 
 
 @cache
+def has_history() -> bool:
+    return (ROOT / ".git").exists() and git("rev-parse", "--is-shallow-repository") == ["false"]
+
+
+@cache
 def files_of(commit: str) -> set[str]:
-    command = ["git", "ls-tree", "-r", "--name-only", commit]
-    return {*subprocess.check_output(command, cwd=ROOT, text=True).splitlines()}
+    return {*git("ls-tree", "-r", "--name-only", commit)}
+
+
+def git(*arguments: str) -> list[str]:
+    return subprocess.check_output(["git", *arguments], cwd=ROOT, text=True).splitlines()
 
 
 def test_rules_of_formats_that_are_cited_are_in_a_table():
