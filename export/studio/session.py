@@ -20,7 +20,7 @@ from ...models.field.field import CrossField
 from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.instance import SKEW_WEIGHT, Instance
 from ...models.processes.child_program import is_stopped
-from ...models.sketch.cover import LEAST_WEIGHT, Frame, curve_pixels, fit_frame
+from ...models.sketch.cover import Frame, curve_pixels, fit_frame
 from ...models.sketch.curves import Curves
 from ...models.sketch.drawing_file import Drawing, parse_drawing
 from ...models.sketch.parallels import leave_out_non_edges
@@ -82,7 +82,7 @@ def read_drawn(document: Document, size: int | None = None) -> DrawnInstance:
         source=source.name if source else f"{document.name}.svg",
     ).with_weights(stroke_weight=document.stroke_weight, skew_weight=SKEW_WEIGHT)
     segments, curve, line = curves.segments(frame)
-    owner, row, column = curve_pixels(segments[line], curve[line], frame, LEAST_WEIGHT)
+    owner, row, column = curve_pixels(segments[line], curve[line], frame)
     number = np.full(frame.shape, -1)
     number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
     pairs = np.stack([owner, number[row, column]], axis=1)

@@ -133,13 +133,11 @@ def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
     return Cover(amount, np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None])
 
 
-def curve_pixels(
-    segments: Floats, curve: Ints, frame: Frame, least: float
-) -> tuple[Indices, Indices, Indices]:
+def curve_pixels(segments: Floats, curve: Ints, frame: Frame) -> tuple[Indices, Indices, Indices]:
     """Curve, row and column (k,) of each pixel that a curve covers, in the order of the curves.
 
-    curve: int (m,), 0 or more, the curve of each segment (m, 2, 2). A curve covers a pixel over a length of
-    `least` pixel sides and more; without such a curve the longest one counts.
+    curve: int (m,), 0 or more, the curve of each segment (m, 2, 2). A curve covers a pixel over LEAST_WEIGHT
+    pixel sides and more; without such a curve the longest one counts.
     """
     pieces = _cut_segments(segments, frame)
     number, size = curve[pieces.segment].astype(np.int64), frame.height * frame.width
@@ -153,7 +151,7 @@ def curve_pixels(
     amount = np.bincount(place, np.concatenate(lengths), len(key))
     most = np.zeros(size)
     np.maximum.at(most, pixel, amount)
-    covers = amount >= np.minimum(least, most[pixel])
+    covers = amount >= np.minimum(LEAST_WEIGHT, most[pixel])
     return owner[covers], *np.divmod(pixel[covers], frame.width)
 
 

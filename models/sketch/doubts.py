@@ -56,6 +56,16 @@ def describe_crowding(filled: Bools, mask: Bools, frame: Frame) -> str | None:
     )
 
 
+def describe_overshot_parts(lost: Bools, frame: Frame) -> str | None:
+    """Areas that `find_overshoots` leaves out."""
+    if not lost.any():
+        return None
+    return (
+        f"the area round {_describe_middle(lost, frame)} is left out, as only ends of curvature lines reach "
+        "into it; if it belongs to the surface, draw a line of its own there"
+    )
+
+
 def _describe_middle(pixels: Bools, frame: Frame) -> str:
     """The middle of some pixels as text."""
     row, column = (frame.pixel * (places.mean() + 0.5) for places in np.nonzero(pixels))

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..instance.angles import cosine, line_of, sine
 from ..instance.domain import Bools, Floats
-from .cover import LEAST_WEIGHT
+from .cover import LEAST_WEIGHT, Frame, curve_pixels
+from .curves import Curves
 
 GAPS: Final = (0.03, 0.06, 0.12)  # shares of the longer side: gaps that count as closed, tried in turn
 ENCLOSED: Final = 0.25  # least share of the strokes' convex hull that a closed drawing fills
@@ -17,6 +18,8 @@ HELD: Final = 2.0  # least stroke length, in pixel sides, in a separate part: a 
 STEP: Final = 3.0  # pixels over which a stroke is compared with the outline
 THICKER: Final = 1.25  # width of the thickest strokes of a picture relative to typical ones
 THICK: Final = 2  # pixels of a stroke between two areas
+_OVERSHOOT: Final = 0.25  # of the length of a line: a longer part of it is no mere overshoot
+_DEEP: Final = 2.0  # pixels from the border of an area: an end that is nearer runs through it
 _NUDGE: Final = 1e-9  # of a pixel: the limit of exactly 30 degrees is decided equally on every processor
 
 
@@ -29,16 +32,16 @@ def find_inside(strokes: Bools) -> Bools:
     hull = convex_area(strokes)
     for gap in GAPS:
         region = enclosed_region(strokes, gap)
-        if drop_narrow_parts(region, 3).sum() >= ENCLOSED * hull:
+        if drop_narrow_parts(region).sum() >= ENCLOSED * hull:
             return region
     return np.ones_like(strokes)
 
 
-def drop_narrow_parts(region: Bools, least: int) -> Bools:
-    """The region without parts that are narrower than so many pixels, such as ends of strokes."""
+def drop_narrow_parts(region: Bools) -> Bools:
+    """The region without parts that are narrower than three pixels, such as ends of strokes."""
     from scipy import ndimage
 
-    return np.asarray(ndimage.binary_opening(region, np.ones((least, least))))
+    return np.asarray(ndimage.binary_opening(region, np.ones((3, 3))))
 
 
 def convex_area(pixels: Bools) -> float:
@@ -67,6 +70,31 @@ def keep_parts_with_strokes(region: Bools, weight: Floats) -> Bools:
     is_part[np.argmax(held)] = held.max() > 0
     is_part[0] = False
     return np.asarray(is_part[label])
+
+
+def find_overshoots(curves: Curves, area: Bools, frame: Frame) -> Bools:
+    """The pixels [height, width] of an area that only ends of curvature lines reach.
+
+    Such an end lies inside of a part of the area, and most of its line in other parts.
+    """
+    from scipy import ndimage
+
+    label, count = ndimage.label(area)
+    segments, curve, is_line = curves.segments(frame)
+    owner, row, column = curve_pixels(segments[is_line], curve[is_line], frame)
+    piece, place, size = np.unique(
+        owner * (count + 1) + label[row, column], return_inverse=True, return_counts=True
+    )
+    step = np.diff(curves.curve, prepend=-1, append=-1) != 0
+    at = np.concatenate([curves.points[step[:-1], 0], curves.points[step[1:], 3]])
+    pixel = np.floor((at - (frame.x, frame.y)) / frame.pixel).astype(int)
+    x, y = pixel.clip(0, np.array(area.shape[::-1]) - 1).T
+    deep = (ndimage.distance_transform_edt(area) >= _DEEP)[y, x]
+    ends = np.tile(curves.curve[step[:-1]], 2)[deep] * (count + 1) + label[y, x][deep]
+    is_end = np.isin(piece, ends) & (size < _OVERSHOOT * np.bincount(owner)[piece // (count + 1)])
+    passed = np.zeros((2, *area.shape), dtype=bool)
+    passed[is_end[place].astype(int), row, column] = True
+    return np.asarray(passed[1] & ~passed[0])
 
 
 def find_strokes_along_outline(region: Bools, direction: Floats, width: float) -> Bools:

@@ -107,7 +107,7 @@ def describe_lines_across(curves: Curves, region: Bools, frame: Frame) -> str | 
     share = (np.arange(_SAMPLES) + 0.5) / _SAMPLES
     at = (start[:, None] + share[:, None] * way[:, None] - (frame.x, frame.y)) / frame.pixel
     column, row = np.moveaxis(np.floor(at).astype(int).clip(-1, max(frame.shape)), -1, 0)
-    body = ndimage.binary_dilation(drop_narrow_parts(region, 3), np.ones((3, 3)))
+    body = ndimage.binary_dilation(drop_narrow_parts(region), np.ones((3, 3)))
     around = np.pad(body, (1, max(frame.shape)))
     is_inside = around[row + 1, column + 1]
     is_across = is_straight & ~is_inside[:, [*range(_BEYOND), *range(-_BEYOND, 0)]].any(axis=1)

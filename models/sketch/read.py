@@ -20,22 +20,21 @@ from ..instance.angles import line_of
 from ..instance.domain import Bools
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance, Reading, name_from_text
 from .bitmap import Bitmap, read_white_pixels
-from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, curve_pixels, fit_frame
+from .cover import LEAST_WEIGHT, Box, Cover, Covers, Frame, block_means, fit_frame
 from .curves import Curves
 from .doubts import (
     describe_crowding,
     describe_loose_strokes,
     describe_open_drawing,
+    describe_overshot_parts,
 )
 from .drawing_file import Drawing, parse_drawing, read_file
 from .labels import label_of
-from .outline import find_inside, find_strokes_along_outline, keep_parts_with_strokes
+from .outline import find_inside, find_overshoots, find_strokes_along_outline, keep_parts_with_strokes
 from .parallels import describe_lines_across, leave_out_non_edges
 
 DEFAULT_SIZE: Final = 24  # few enough pixels to try every formulation
 MAX_SIZE: Final = 4096
-_OVERSHOOT: Final = 0.25  # of the length of a line: a longer part of it is no mere overshoot
-_DEEP: Final = 2.0  # pixels from the border of an area: an end that is nearer runs through it
 
 Silhouette = Literal["none", "outer"]
 
@@ -57,7 +56,8 @@ def read_sketch(
 
     Directions within a pixel are averaged by the double angle. The reliability w is min(1, length in the
     pixel / pixel side) R, where R is the length of the mean double-angle vector. Pixels with a small w, or
-    with R below 1/2 as at crossings, have no direction.
+    with R below 1/2 as at crossings, have no direction. `reading.warnings` of the instance are doubts about
+    the drawing.
 
     Parameters
     ----------
@@ -66,10 +66,10 @@ def read_sketch(
     size
         Pixels on the longer side of the grid, 1 to 4096.
     mask
-        Picture that is white where the field is wanted, of the size of the bitmap or page; for a photograph
-        whose sheet is straightened, of the size of the photograph or of the sheet. The grid is then the white
-        part, and a pixel belongs to it from half of its area on. By default the grid is the drawing with a
-        margin of 4 %, and the mask its inside; an open drawing has the whole rectangle.
+        Picture that is white where the field is wanted, of the size of the bitmap or page; for a straightened
+        photograph, of the size of the photograph or of its sheet. The grid is then the white part, with the
+        pixels that are white over half of their area. By default the grid is the drawing with a margin of
+        4 %, and the mask its inside; an open drawing has the whole rectangle.
     gauge
         Window of alpha, as in `Instance`.
     name
@@ -85,11 +85,6 @@ def read_sketch(
         Viewpoint of a .curves file: `front`, `side`, `top`, or azimuth and elevation in degrees, as in
         `30,25`.
 
-    Returns
-    -------
-    Instance
-        The instance. Its `reading.warnings` are doubts about the drawing.
-
     Raises
     ------
     InputError
@@ -102,7 +97,7 @@ def read_sketch(
     """
     path = Path(path)
     check_size(size)
-    check_silhouette(silhouette)
+    check_choice("silhouette", silhouette, get_args(Silhouette))
     labels = tuple(map(label_of, curvature))
     data = read_file(path)
     try:
@@ -155,8 +150,8 @@ def instance_of_drawing(
         frame, region = frame_around_white(white, drawing.page, size)
         covers = drawing.covers(frame)
         mask = region & ~covers.cuts
-        warnings = _list_warnings(*drawing.notes, describe_crowding(covers.filled, mask, frame))
-        reading = Reading(drawing.page, warnings)
+        doubts = filter(None, [describe_crowding(covers.filled, mask, frame)])
+        reading = Reading(drawing.page, (*drawing.notes, *doubts))
         if silhouette == "outer":
             covers = drop_outline_directions(covers, region)
     return instance_of_mask(
@@ -191,54 +186,14 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
         raise NoStrokeError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
         )
-    warnings = _list_warnings(
-        *drawing.notes,
+    doubts = (
         describe_open_drawing(region),
         describe_lines_across(drawing, region, frame) if isinstance(drawing, Curves) else None,
-        _describe_overshot_parts(reached & ~mask, frame),
+        describe_overshot_parts(reached & ~mask, frame),
         describe_loose_strokes(walls, region, frame),
         describe_crowding(covers.filled, mask, frame),
     )
-    return mask, Reading(drawing.page, warnings)
-
-
-def find_overshoots(curves: Curves, area: Bools, frame: Frame) -> Bools:
-    """The pixels [height, width] of an area that only ends of curvature lines reach.
-
-    Such an end lies inside of a part of the area, and most of its line in other parts.
-    """
-    from scipy import ndimage
-
-    label, count = ndimage.label(area)
-    segments, curve, is_line = curves.segments(frame)
-    owner, row, column = curve_pixels(segments[is_line], curve[is_line], frame, LEAST_WEIGHT)
-    piece, place, size = np.unique(
-        owner * (count + 1) + label[row, column], return_inverse=True, return_counts=True
-    )
-    step = np.diff(curves.curve, prepend=-1, append=-1) != 0
-    at = np.concatenate([curves.points[step[:-1], 0], curves.points[step[1:], 3]])
-    pixel = np.floor((at - (frame.x, frame.y)) / frame.pixel).astype(int)
-    x, y = pixel.clip(0, np.array(area.shape[::-1]) - 1).T
-    deep = (ndimage.distance_transform_edt(area) >= _DEEP)[y, x]
-    ends = np.tile(curves.curve[step[:-1]], 2)[deep] * (count + 1) + label[y, x][deep]
-    is_end = np.isin(piece, ends) & (size < _OVERSHOOT * np.bincount(owner)[piece // (count + 1)])
-    passed = np.zeros((2, *area.shape), dtype=bool)
-    passed[is_end[place].astype(int), row, column] = True
-    return np.asarray(passed[1] & ~passed[0])
-
-
-def _describe_overshot_parts(lost: Bools, frame: Frame) -> str | None:
-    if not lost.any():
-        return None
-    y, x = (np.argwhere(lost).mean(axis=0) + 0.5) * frame.pixel + (frame.y, frame.x)
-    return (
-        f"the area round ({x:.4g}, {y:.4g}) is left out, as only ends of curvature lines reach into it; if "
-        "it belongs to the surface, draw a line of its own there"
-    )
-
-
-def _list_warnings(*doubts: str | None) -> tuple[str, ...]:
-    return tuple(doubt for doubt in doubts if doubt is not None)
+    return mask, Reading(drawing.page, (*drawing.notes, *filter(None, doubts)))
 
 
 def drop_silhouette(covers: Covers, mask: Bools) -> tuple[Covers, Bools]:
@@ -314,8 +269,3 @@ def check_size(size: int) -> None:
     """Raise InputError if a grid cannot have that many pixels on its longer side."""
     if not 1 <= size <= MAX_SIZE:
         raise InputError(f"size is {size}; choose 1 to {MAX_SIZE} pixels for the longer side")
-
-
-def check_silhouette(silhouette: str) -> None:
-    """Raise InputError for an unknown treatment of silhouettes."""
-    check_choice("silhouette", silhouette, get_args(Silhouette))

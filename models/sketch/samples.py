@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from importlib.resources import files
-from typing import Final, Literal
+from typing import Final, Literal, get_args
 
 from ..arguments import check_choice
 from ..errors import InputError
 from ..instance.instance import Gauge, Instance
-from .read import DEFAULT_SIZE, Silhouette, check_silhouette, check_size, instance_of_drawing
+from .read import DEFAULT_SIZE, Silhouette, check_size, instance_of_drawing
 from .surfaces import analytic
 from .svg import read_svg
 
@@ -61,7 +61,7 @@ def drawn_sample(
     """Instance of a built-in sketch or surface, as `sample` describes it. Raises InputError."""
     size = DEFAULT_SIZE if size is None else size
     check_size(size)
-    check_silhouette(silhouette)
+    check_choice("silhouette", silhouette, get_args(Silhouette))
     if SAMPLES[name].kind == "analytic":
         if silhouette != "none":
             raise InputError(f"{name} is computed, not drawn; choose the silhouette none")
