@@ -51,7 +51,7 @@ def next_step(data: bytes) -> dict[str, Any]:
 def _field_view(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     instance, (x, y), spots = drawn.instance, drawn.instance.origin, field.singularities
     pixel = instance.pixel_size
-    shape = field.shape
+    facts = field.facts()
     return {
         "stage": "field",
         "size": max(instance.mask.shape),
@@ -71,9 +71,9 @@ def _field_view(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
         "numbers": {
             "pixels": instance.grid.size,
             "strokes": len(instance.theta),
-            "deviation": float(np.degrees(shape.mean_deviation)),
-            "most_deviation": float(np.degrees(shape.most_deviation)),
-            "energy": field.energy(2).total,
+            "deviation": facts["stroke_deviation_mean_degrees"],
+            "most_deviation": facts["stroke_deviation_90_percent_degrees"],
+            "energy": facts["energy_2_norm"],
             "singularities": count_singularities(field),
         },
     }

@@ -16,7 +16,7 @@ from ..instance.instance import Instance
 from ..instance.terms import parity_sign, quarter_turns
 from ..previews import Pictured
 from .jumps import best_jumps, label_of, step_labels
-from .measures import Energy, Shape, Singularities
+from .measures import Energy, Singularities
 
 AbsoluteNorm = Literal[1, "mixed"]
 """Norms in which pairs count with absolute values."""
@@ -26,17 +26,14 @@ Norm = Literal[2, AbsoluteNorm]
 of stroke and skew terms (mixed).
 """
 
-DEGENERATE: Final = np.radians(2.5)  # lines closer than 5 degrees count as one: |beta| > pi/4 - DEGENERATE
-FAR: Final = np.radians(10)  # A stroke that deviates more than this from both lines counts as not followed
-NARROW: Final = QUARTER  # lines that are less than this apart are a narrow cross
-_MOST: Final = 0.9  # share of the stroke pixels that deviate no more than `Shape.most_deviation`
+NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
+"""Every norm."""
+
+_DEGENERATE: Final = np.radians(2.5)  # lines closer than 5 degrees count as one: |beta| > pi/4 - _DEGENERATE
+_FAR: Final = np.radians(10)  # a stroke that deviates more than this from both lines counts as not followed
 _EQUAL: Final = 1e-9  # radians; lines 45 degrees apart are not narrow
 _TIE: Final = 1e-3  # relative to pi/4: what |A| may exceed it by before another jump is the nearest one
 _ROUNDING: Final = 1e-12  # quarter turns by which a label may miss its window
-
-
-NORMS: Final = (1, 2, "mixed")
-"""Every norm."""
 
 
 def check_norm(norm: Any) -> None:
@@ -50,8 +47,7 @@ class CrossField(Pictured):
     """Angles of crosses and jumps between neighbours, on the grid of an instance with n pixels and m pairs.
 
     Line u is at alpha + beta and line v at alpha + pi/2 - beta, in radians counter-clockwise from +x with y
-    up. A jump relates the labels of a pair's first and second pixel (docs/mathematics.md, 2 and
-    3).
+    up. A jump relates the labels of a pair's first and second pixel (docs/mathematics.md, 2 and 3).
 
     Parameters
     ----------
@@ -107,8 +103,8 @@ class CrossField(Pictured):
         The lines need not be at right angles. Turns by pi and the order of the two lines do not matter: the
         label is the one in the window of the instance's gauge. Under `strokes` its u is the line nearer to
         the stroke. Under `box` it may be the other line, whose distance the energy then counts
-        (docs/mathematics.md, 4). Crosses stay as they are; both lines may coincide, where
-        abs(beta) = pi/4. Where crosses are orthogonal, beta becomes 0.
+        (docs/mathematics.md, 4). Both lines may coincide, where abs(beta) = pi/4. Where crosses are
+        orthogonal, beta becomes 0.
 
         Parameters
         ----------
@@ -118,20 +114,13 @@ class CrossField(Pictured):
             Angles of the two lines, shape (n,), the points in the order of `instance.domain`. Radians
             counter-clockwise from +x, with y up.
 
-        Returns
-        -------
-        CrossField
-            The field.
-
         Raises
         ------
         InputError
             For another shape, such as vectors, and for values that are not finite or exceed 1e6.
 
         """
-        alpha, beta = label_of(
-            _check_angles(instance, u_angle, "u_angle"), _check_angles(instance, v_angle, "v_angle")
-        )
+        alpha, beta = label_of(*_check_lines(instance, u_angle, v_angle))
         steps = _steps_into_windows(instance, alpha, beta, inside=True)
         alpha = np.clip(alpha + HALF * steps, instance.alpha_lower, instance.alpha_upper)
         beta = np.clip(parity_sign(steps) * beta, -QUARTER, QUARTER)
@@ -232,7 +221,7 @@ class CrossField(Pictured):
     @cached_property
     def degenerate(self) -> Bools:
         """True where both lines are the same to within 5 degrees; shape (n,)."""
-        return np.asarray(np.abs(self.beta) > QUARTER - DEGENERATE)
+        return np.asarray(np.abs(self.beta) > QUARTER - _DEGENERATE)
 
     @property
     def angle_between(self) -> Floats:
@@ -242,65 +231,36 @@ class CrossField(Pictured):
     @property
     def stroke_deviation(self) -> Floats:
         """Angle between each stroke and the nearer line, in [0, pi/2] radians; shape (s,)."""
-        return self.deviation(self.instance.stroke_index, self.instance.theta)
-
-    def deviation(self, pixels: Ints, theta: Floats) -> Floats:
-        """Angle between theta and the nearer line at each of some pixels, in [0, pi/2] radians: (k,)."""
-        to_u = line_difference(self.u_angle[pixels], theta)
-        return np.minimum(to_u, line_difference(self.v_angle[pixels], theta))
-
-    @property
-    def shape(self) -> Shape:
-        """Distances of the lines from the strokes, and the share of narrow crosses."""
-        deviation = self.stroke_deviation if len(self.instance.theta) else np.zeros(1)
-        return Shape(
-            mean_deviation=float(deviation.mean()),
-            most_deviation=float(np.quantile(deviation, _MOST)),
-            far_strokes=float(np.mean(deviation > FAR)),
-            narrow_pixels=float(np.mean(self.angle_between < NARROW - _EQUAL)),
-        )
+        at, theta = self.instance.stroke_index, self.instance.theta
+        return np.minimum(*(line_difference(angle[at], theta) for angle in (self.u_angle, self.v_angle)))
 
     def facts(self) -> dict[str, float | int]:
-        """Measures of the field by name, as reports list them: energies, shape, singularities, skew."""
-        shape = self.shape
+        """Measures of the field by name, as reports list them: energies, lines, singularities, skew.
+
+        The mean and the 90 % quantile of `stroke_deviation`; the share of the strokes where it exceeds 10
+        degrees, and of the pixels whose lines are less than 45 degrees apart.
+        """
+        deviation = self.stroke_deviation if len(self.instance.theta) else np.zeros(1)
         return {
             "energy_2_norm": self.energy(2).total,
             "energy_1_norm": self.energy(1).total,
-            "stroke_deviation_mean_degrees": float(np.degrees(shape.mean_deviation)),
-            "stroke_deviation_90_percent_degrees": float(np.degrees(shape.most_deviation)),
-            "strokes_beyond_10_degrees": shape.far_strokes,
-            "lines_under_45_degrees": shape.narrow_pixels,
+            "stroke_deviation_mean_degrees": float(np.degrees(deviation.mean())),
+            "stroke_deviation_90_percent_degrees": float(np.degrees(np.quantile(deviation, 0.9))),
+            "strokes_beyond_10_degrees": float(np.mean(deviation > _FAR)),
+            "lines_under_45_degrees": float(np.mean(self.angle_between < QUARTER - _EQUAL)),
             "singularities": len(self.singularities.index),
             "degenerate_pixels": int(self.degenerate.sum()),
             "mean_abs_beta_degrees": float(np.degrees(np.abs(self.beta).mean())),
         }
 
     def cross_error(self, u_angle: Floats, v_angle: Floats) -> Floats:
-        """Angle between the crosses of the field and others.
+        """Angle between the crosses of the field and others at each pixel, shape (n,), in radians.
 
         The mean of the two line differences, for the better of the two assignments of lines
-        (docs/mathematics.md, 9).
-
-        Parameters
-        ----------
-        u_angle, v_angle
-            Angles of the lines of the others, shape (n,), radians.
-
-        Returns
-        -------
-        Floats
-            The angle at each pixel, shape (n,), in radians.
-
-        Raises
-        ------
-        InputError
-            For the same angles as `from_lines`.
-
+        (docs/mathematics.md, 9). u_angle, v_angle: of the lines of the others, as in `from_lines`, which
+        raises the same errors.
         """
-        u, v = (
-            _check_angles(self.instance, u_angle, "u_angle"),
-            _check_angles(self.instance, v_angle, "v_angle"),
-        )
+        u, v = _check_lines(self.instance, u_angle, v_angle)
         straight = line_difference(self.u_angle, u) + line_difference(self.v_angle, v)
         crossed = line_difference(self.u_angle, v) + line_difference(self.v_angle, u)
         return np.minimum(straight, crossed) / 2
@@ -374,18 +334,19 @@ def _steps_into_windows(instance: Instance, alpha: Floats, beta: Floats, *, insi
     return steps
 
 
-def _check_angles(instance: Instance, values: Any, name: str) -> Floats:
-    """The angles (n,). Raises InputError."""
-    angles = float_array(values, name)
-    size = instance.domain.size
-    if angles.shape != (size,):
-        raise InputError(
-            f"{name} has shape {angles.shape}, but {instance.name} has {size} pixels; give an angle for each"
-        )
-    wrong = ~(np.abs(angles) <= MOST_ANGLE)
-    if wrong.any():
-        raise InputError(
-            f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is not an angle; "
-            f"give radians up to {MOST_ANGLE:g}"
-        )
-    return angles
+def _check_lines(instance: Instance, u_angle: Any, v_angle: Any) -> tuple[Floats, Floats]:
+    """The angles of the two lines of each point, (n,) each. Raises InputError."""
+    u, v = float_array(u_angle, "u_angle"), float_array(v_angle, "v_angle")
+    for name, angles in (("u_angle", u), ("v_angle", v)):
+        if angles.shape != (size := instance.domain.size,):
+            raise InputError(
+                f"{name} has shape {angles.shape}, but {instance.name} has {size} pixels; "
+                "give an angle for each"
+            )
+        wrong = ~(np.abs(angles) <= MOST_ANGLE)
+        if wrong.any():
+            raise InputError(
+                f"{name} of pixel {int(np.argmax(wrong))} is {angles[wrong][0]}, which is not an angle; "
+                f"give radians up to {MOST_ANGLE:g}"
+            )
+    return u, v

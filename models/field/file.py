@@ -31,7 +31,7 @@ from ..instance.mesh import Mesh
 from ..storage import read_bytes, replacing, require_suffix
 from ..written_files import FORCE, check_targets, is_unchanged
 from .exchange import TEXT_READERS, TEXT_WRITERS, most_text_bytes, to_obj, to_sings
-from .field import CrossField, Norm
+from .field import NORMS, CrossField
 
 FORMAT: Final = "crossfield-field"
 VERSION: Final = 1
@@ -42,13 +42,12 @@ _ARCHIVE: Final = {
     "beta": ExpectedArray(1, MAX_GRID**2),
     "p": ExpectedArray(1, 2 * MAX_GRID**2),
 }
-_NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
 SAME: Final = 1e-9  # difference of energies, relative to them plus 1, up to which none is the lower one
 _Entry = TypeVar("_Entry")
 
 
 def write_field(field: CrossField, path: str | Path, *, force: bool = False) -> Path:
-    """Write a field. Equal fields give equal bytes.
+    """Write a field and return the path. Equal fields give equal bytes.
 
     Parameters
     ----------
@@ -60,11 +59,6 @@ def write_field(field: CrossField, path: str | Path, *, force: bool = False) -> 
     force
         Whether to replace files that crossfield has not written or that have changed since, and a better
         field: one on the same instance with less energy in every norm.
-
-    Returns
-    -------
-    Path
-        The path.
 
     Raises
     ------
@@ -111,7 +105,7 @@ def _check_not_worse(field: CrossField, path: Path) -> None:
     earlier = earlier_field(path, field.instance)
     if earlier is None:
         return
-    energies = [(earlier.energy(norm).total, field.energy(norm).total) for norm in _NORMS]
+    energies = [(earlier.energy(norm).total, field.energy(norm).total) for norm in NORMS]
     if all(was < now - SAME * (1 + now) for was, now in energies):
         was, now = energies[0]
         raise OutputError(
@@ -133,11 +127,6 @@ def read_field(path: str | Path, *, on: Instance | None = None) -> CrossField:
     on
         The instance that the field must be on; a field of its other gauge is moved into its windows. A
         .rawfield and a .rosy need it: they contain none.
-
-    Returns
-    -------
-    CrossField
-        The field.
 
     Raises
     ------

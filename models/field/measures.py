@@ -1,4 +1,4 @@
-"""Measures of a field: its energy, its shape, and its singularities."""
+"""Measures of a field: its energy and its singularities."""
 
 from __future__ import annotations
 
@@ -22,21 +22,6 @@ class Energy:
     def total(self) -> float:
         """Smooth + strokes + beta."""
         return self.smooth + self.strokes + self.beta
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Measures of a field that a designer sees, independent of energy and weights.
-
-    mean_deviation, most_deviation: mean and 90 % quantile of `CrossField.stroke_deviation`. far_strokes:
-    share of the strokes where it exceeds 10 degrees. narrow_pixels: share of all pixels whose lines are less
-    than 45 degrees apart.
-    """
-
-    mean_deviation: float
-    most_deviation: float
-    far_strokes: float
-    narrow_pixels: float
 
 
 @dataclass(frozen=True)

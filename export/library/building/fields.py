@@ -12,7 +12,7 @@ from typing import Final
 
 import numpy as np
 
-from ....models.field.field import CrossField, Norm
+from ....models.field.field import NORMS, CrossField, Norm
 from ....models.formulations.problem import Problem, formulate
 from ....models.instance.instance import Instance
 from ....models.proof.certificate import write_certificate
@@ -29,7 +29,7 @@ from ..ledger.points import (
     clipped_field,
     finder,
 )
-from ..plan.recipe import NORMS, InstanceRecipe
+from ..plan.recipe import InstanceRecipe
 
 _ROUNDS: Final = 8
 _NODES: Final = {"tiny": 1000, "small": 20}  # of the branch and bound in the 1-norm, by rung

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
 
+from ....models.field.field import NORMS
 from ....models.field.file import read_field
 from ....models.formulations.catalogue import FORMULATIONS
 from ....models.proof.checkers import check_certificate, check_orthogonal
@@ -19,7 +20,7 @@ from ...pictures.draw import page_picture
 from ...writing.records import number_text
 from ..documents import check_point
 from ..documents.checksums import SUMS, write_checksums
-from ..documents.citation import PAPER, REFERENCES, licence_terms, release_facts
+from ..documents.citation import PAPER, REFERENCES, licence_terms
 from ..documents.documents import (
     INDEX,
     INDEX_FORMAT,
@@ -31,7 +32,7 @@ from ..documents.documents import (
     load_document,
 )
 from ..ledger.ledger import LEDGER, read_ledger
-from ..plan.recipe import NORMS, InstanceRecipe, norm_minimised
+from ..plan.recipe import InstanceRecipe, norm_minimised
 from ..plan.spec import RUNGS, Spec
 from .table import TABLE, instance_name, table
 
@@ -132,7 +133,7 @@ def _template_context(spec: Spec, sidecars: list[dict[str, Any]]) -> dict[str, A
     return {
         "spec": spec,
         "generator": program_version(),
-        "release": release_facts(spec),
+        "release": {"title": spec.title, "authors": []} | (spec.release or {}),
         "terms": licence_terms(spec.sketches),
         "references": REFERENCES,
         "paper": PAPER,

@@ -5,19 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Final
 
-from ....models.field.field import CrossField
+from ....models.field.field import NORMS, CrossField
 from ....models.field.file import field_to_json
 from ....models.instance.file import instance_to_json
 from ....models.instance.instance import Instance
 from ....models.sketch.random_strokes import RAGGED_SHARE
 from ...formats.registry import program_version
 from ..documents.documents import ABOUT_FORMAT, VERSION, about_file, document_bytes
-from ..documents.statistics import instance_sizes
 from ..ledger.known_points import InstancePoints
 from ..ledger.ledger import SubmittedCertificate
 from ..ledger.points import ROLES, KnownField, check_certificate, least_energy
 from ..plan.instances import kind_of, make_instance
-from ..plan.recipe import NORMS, InstanceRecipe
+from ..plan.recipe import InstanceRecipe
 from .fields import given_fields, search_fields
 
 Files = dict[str, bytes]  # by name, in the order of writing
@@ -109,7 +108,9 @@ def _instance_document(instance: Instance, task: InstanceTask, fields: dict[str,
         "instance": {
             "file": f"{task.name}.instance.json",
             "sha256": instance.sha256,
-            **instance_sizes(instance),
+            f"{instance.domain.kind}s": instance.domain.size,
+            "strokes": len(instance.theta),
+            "pairs": len(instance.domain.first),
         },
         "fields": fields,
         "recipe_sha256": task.sha256,

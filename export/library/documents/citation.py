@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Final
 
-from ..plan.spec import Sketch, Spec
+from ..plan.spec import Sketch
 
 LICENCES: Final = (
     "CC0-1.0",
@@ -28,11 +28,6 @@ REFERENCES: Final = (
         "the problem"
     ),
 )
-
-
-def release_facts(spec: Spec) -> dict[str, Any]:
-    """Return what is cited: title, authors, and stated version and date."""
-    return {"title": spec.title, "authors": []} | (spec.release or {})
 
 
 def licence_terms(sketches: Sequence[Sketch]) -> dict[str, Any]:

@@ -15,12 +15,6 @@ from ...writing.canonical import CanonicalForm
 from ...writing.curvature import objective_curvature, row_curvature
 
 
-def instance_sizes(instance: Instance) -> dict[str, int]:
-    """Return the numbers of pixels or faces, of strokes and of pairs."""
-    domain = instance.domain
-    return {f"{domain.kind}s": domain.size, "strokes": len(instance.theta), "pairs": len(domain.first)}
-
-
 def density(instance: Instance) -> float:
     """Return the share of the pixels, or faces, that are strokes, to four decimals."""
     return round(len(instance.theta) / instance.domain.size, 4)

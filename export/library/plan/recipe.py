@@ -18,7 +18,7 @@ from itertools import product
 from typing import Any, Final
 
 from ....models.errors import InputError, UnsupportedByFormatError
-from ....models.field.field import Norm
+from ....models.field.field import NORMS, Norm
 from ....models.formulations.catalogue import AT_JUMPS, FORMULATIONS
 from ....models.formulations.choice import declare, norm_of
 from ...formats.registry import FORMATS, problem_in_format
@@ -27,7 +27,6 @@ from .spec import Rung, Sketch, Spec
 
 _LONGEST: Final = 32  # characters of a name before its suffix
 _OF_SKETCH: Final = ("kind", "what", "title", "origin", "added")
-NORMS: Final[tuple[Norm, ...]] = (2, 1, "mixed")
 
 
 @dataclass(frozen=True)

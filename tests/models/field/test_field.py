@@ -30,18 +30,18 @@ def test_the_shape_of_a_field_is_what_vectors_say():
     def apart(one, other):
         return np.degrees(np.arccos(np.clip(np.abs(np.cos(one - other)), 0, 1)))
 
-    off, shape = np.minimum(apart(u[at], stroke), apart(v[at], stroke)), field.shape
+    off, facts = np.minimum(apart(u[at], stroke), apart(v[at], stroke)), field.facts()
     assert np.degrees(field.stroke_deviation) == pytest.approx(off, abs=1e-6)
-    assert np.degrees(shape.mean_deviation) == pytest.approx(off.mean(), abs=1e-6)
-    assert np.sum(off <= np.degrees(shape.most_deviation) + 1e-6) >= 0.9 * len(off) - 1
-    assert 0 < shape.far_strokes == np.mean(off > 10) < 1
-    assert 0 < shape.narrow_pixels == np.mean(apart(u, v) < 45) < 1
+    assert facts["stroke_deviation_mean_degrees"] == pytest.approx(off.mean(), abs=1e-6)
+    assert np.sum(off <= facts["stroke_deviation_90_percent_degrees"] + 1e-6) >= 0.9 * len(off) - 1
+    assert 0 < facts["strokes_beyond_10_degrees"] == np.mean(off > 10) < 1
+    assert 0 < facts["lines_under_45_degrees"] == np.mean(apart(u, v) < 45) < 1
 
 
 @pytest.mark.parametrize("skew", [22.5, -22.5])
 def test_45_degrees_are_not_narrow(skew):
     field = cf.CrossField(grid("/#", 0.0), [0.2, 0.2], np.radians([skew, skew]), [0])
-    assert field.shape.narrow_pixels == 0
+    assert field.facts()["lines_under_45_degrees"] == 0
 
 
 @settings(max_examples=40)
