@@ -1,4 +1,4 @@
-"""The best angles for given jumps in any norm, and the bound from their multipliers.
+"""The best angles for given jumps in any norm, and their multipliers.
 
 With x = (alpha, beta), shape (2n,), the energy at jumps p (docs/mathematics.md, 5) is sum k phi(Mx + c): two
 rows for each pair, A and B with k = 2, one for each stroke, R with k = w_strokes w, and one for each pixel,
@@ -14,8 +14,7 @@ the least energy in the box.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -41,61 +40,6 @@ _TOUCHING: Final = 1e-7  # radians from a side of the box within which Clarabel 
 _DECIMALS: Final = 12
 
 
-@dataclass(frozen=True, eq=False)
-class NormResiduals(Residuals):
-    """The residuals of all terms at given jumps, with the energy sum of k phi(r) of a norm.
-
-    squared (r,): where phi is the square.
-    """
-
-    squared: Bools
-
-    @classmethod
-    def of(
-        cls, instance: Instance, p: Ints, norm: Norm, lines: Ints | None = None, target: Floats | None = None
-    ) -> NormResiduals:
-        """The residuals at jumps p (m,). lines, target: as of `residuals_at`."""
-        terms = residuals_at(instance, p, lines=lines, target=target)
-        of_pair = np.arange(len(terms.weight)) < 2 * len(p)
-        squared = (norm == 2) | (~of_pair & (norm == "mixed"))
-        return cls(terms.matrix, terms.constant, terms.weight, squared)
-
-    def energy(self, x: Floats) -> float:
-        """The energy at angles x."""
-        sizes = np.abs(self.at(x))
-        return float(self.weight @ np.where(self.squared, sizes * sizes, sizes))
-
-    def bound(self, multipliers: Floats, lower: Floats, upper: Floats, tilt: Floats) -> float:
-        """A lower bound of the energy less tilt x, with lower <= x <= upper, from any multipliers (r,).
-
-        lower, upper, tilt: shapes (2n,).
-        """
-        l = np.where(self.squared, multipliers, np.clip(multipliers, -1.0, 1.0))  # noqa: E741 - of the equation
-        force = self.weight * l
-        slope = self.matrix.T @ force - tilt
-        terms = np.concatenate(
-            [
-                force * self.constant,
-                -self.weight * np.where(self.squared, l * l / 4, 0.0),
-                np.minimum(slope * lower, slope * upper),
-            ]
-        )
-        size = np.abs(force) @ (np.abs(self.matrix) @ np.maximum(np.abs(lower), np.abs(upper)))
-        return math.fsum(terms) - 2.0**-48 * float(size + np.abs(terms).sum())
-
-
-@dataclass(frozen=True, eq=False)
-class AngleFit:
-    """The best angles x (2n,) in a box, the multipliers (r,) of its residuals, and the bound that they give.
-
-    Multipliers are 0 where weights are 0.
-    """
-
-    x: Floats
-    multipliers: Floats
-    bound: float
-
-
 def solve_angle_program(
     instance: Instance,
     p: Ints,
@@ -107,29 +51,36 @@ def solve_angle_program(
     lines: Ints | None = None,
     target: Floats | None = None,
     weight: Floats | None = None,
-) -> AngleFit:
-    """Compute the angles that minimise the energy minus tilt x in a box, with Clarabel.
+) -> tuple[Floats, Floats]:
+    """Angles x (2n,) that minimise the energy minus tilt x in a box, and multipliers (r,) of its residuals.
 
+    Clarabel computes them; multipliers are 0 where weights are 0.
     p: jumps, shape (m,). lower, upper: the box of x = (alpha, beta) in radians, shapes (2n,). tilt: shape
     (2n,), None for zeros. lines, target: as of `residuals_at`. weight (r,): of the residuals, None for theirs
     in the energy. Raises CrossfieldError when Clarabel finds no solution; one always exists.
     """
-    terms = NormResiduals.of(instance, p, norm, lines, target)
+    terms = residuals_at(instance, p, lines=lines, target=target)
     if weight is not None:
         terms = replace(terms, weight=weight)
+    squared = (norm == 2) | ((np.arange(len(terms.weight)) >= 2 * len(p)) & (norm == "mixed"))
     tilt = np.zeros(len(lower)) if tilt is None else tilt
-    x, multipliers = _solve_program(terms, lower, upper, tilt)
-    multipliers = np.where(terms.squared, multipliers, np.clip(multipliers, -1.0, 1.0))
+    x, multipliers = _solve_program(terms, squared, lower, upper, tilt)
+    multipliers = np.where(squared, multipliers, np.clip(multipliers, -1.0, 1.0))
     multipliers[terms.weight == 0] = 0.0
-    return AngleFit(x, multipliers, terms.bound(multipliers, lower, upper, tilt))
+    return x, multipliers
 
 
-def _solve_program(terms: NormResiduals, lower: Floats, upper: Floats, tilt: Floats) -> tuple[Floats, Floats]:
-    """The angles and the multipliers that solve the program, with a size t >= |r| for each absolute value."""
+def _solve_program(
+    terms: Residuals, squared: Bools, lower: Floats, upper: Floats, tilt: Floats
+) -> tuple[Floats, Floats]:
+    """The angles and the multipliers that solve the program, with a size t >= |r| for each absolute value.
+
+    squared (r,): where phi is the square.
+    """
     import clarabel
 
     n, weighted = len(lower), terms.weight > 0
-    rows, squares = np.flatnonzero(weighted & ~terms.squared), np.flatnonzero(weighted & terms.squared)
+    rows, squares = np.flatnonzero(weighted & ~squared), np.flatnonzero(weighted & squared)
     m, inside = len(rows), sparse.eye_array(n)
     matrix, constant, weight = terms.matrix[rows], terms.constant[rows], terms.weight[rows]
     square, goal, force = terms.matrix[squares], terms.constant[squares], 2 * terms.weight[squares]
@@ -190,12 +141,12 @@ def _clarabel_settings() -> clarabel.DefaultSettings:
 def fit_absolute(field: CrossField, norm: AbsoluteNorm) -> tuple[CrossField, Floats]:
     """Return the field of least energy for the jumps of `field`, and the multipliers of its strokes, (s,)."""
     instance, m, within = field.instance, len(field.p), angle_bounds(field.instance)
-    fit = solve_angle_program(instance, field.p, norm, *within)
+    fitted, multipliers = solve_angle_program(instance, field.p, norm, *within)
     # Rounding makes equal angles equal, which the solver returns with its error.
-    rounded = np.clip(np.round(fit.x, _DECIMALS), *within)
-    fields = [field_at(instance, x, field.p) for x in (rounded, fit.x)]
+    rounded = np.clip(np.round(fitted, _DECIMALS), *within)
+    fields = [field_at(instance, x, field.p) for x in (rounded, fitted)]
     best = min(*fields, field, key=lambda candidate: candidate.energy(norm).total)
-    return best, fit.multipliers[2 * m : 2 * m + len(instance.theta)]
+    return best, multipliers[2 * m : 2 * m + len(instance.theta)]
 
 
 @one_thread()

@@ -189,14 +189,14 @@ def _minimise_on_piece(
     above, below = _deductions(terms, step, piece)
     counts = _counts(terms, step, piece)
     tilt = np.concatenate([np.zeros(n), 4 * (above - below) * counts * (terms.norm != 1)])
-    fit = solve_angle_program(
+    x, fitted = solve_angle_program(
         instance, p, terms.norm, low, high, tilt=tilt, lines=piece.line[at], target=step.theta[at],
         weight=np.concatenate([of_a, of_b, (of_r * counts)[at], of_beta]),
     )  # fmt: skip
-    multipliers[: 2 * m], multipliers[2 * m + n :] = fit.multipliers[: 2 * m], fit.multipliers[-n:]
-    multipliers[2 * m + at] = fit.multipliers[2 * m : -n]
+    multipliers[: 2 * m], multipliers[2 * m + n :] = fitted[: 2 * m], fitted[-n:]
+    multipliers[2 * m + at] = fitted[2 * m : -n]
     multipliers = np.round(multipliers * _DIGITS) / _DIGITS
-    return _PieceMinimum(fit.x, linear_bound(terms, step, piece, multipliers), multipliers)
+    return _PieceMinimum(x, linear_bound(terms, step, piece, multipliers), multipliers)
 
 
 def _deductions(terms: EnergyTerms, step: LastStep, piece: BoxPiece) -> Floats:
