@@ -63,15 +63,10 @@ def print_line(text: str) -> None:
     typer.echo(text, file=sys.stdout)  # another stream would lack the escapes of `escape_unencodable`
 
 
-def print_json(value: object) -> None:
-    """Print a value as JSON on standard output."""
-    typer.echo(json.dumps(value, indent=1, allow_nan=False))
-
-
 def print_result(document: object, show: Callable[[], None], *, as_json: bool) -> None:
     """Print a document as JSON, or call the function that shows it."""
     if as_json:
-        print_json(document)
+        typer.echo(json.dumps(document, indent=1, allow_nan=False))
     else:
         show()
 

@@ -286,7 +286,7 @@ def _family_text(family: PlacedFamily) -> dict[str, str]:
         left, right = words.expression(declared.relation.left), words.expression(declared.relation.right)
         pieces = [*left, SENSES[declared.sense], *right]
     else:
-        pieces = wrap_lines(words.summands(declared.body), WIDTH, b"  ")
+        pieces = wrap_lines(words.summands(declared.body), WIDTH)
     paper = f"section {declared.paper}" if declared.paper[0].isdigit() else declared.paper
     return {
         "tag": family.family.tag,

@@ -113,7 +113,7 @@ def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
     yield b"OBJ: minimize\n" if problem.objective else b"OBJ: minimize\n  0\n"
     for family in problem.objective:
         terms = _BaronExpressions(family, names).summands(family.family.body)
-        yield from render([*wrap_lines(terms, WIDTH, b"  "), b"\n"], family.count)
+        yield from render([*wrap_lines(terms, WIDTH), b"\n"], family.count)
     yield b";\n"
 
 

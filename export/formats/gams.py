@@ -168,7 +168,7 @@ def _objective(problem: Problem, names: Names) -> Iterator[bytes]:
         yield b"  0\n"
     for family in problem.objective:
         terms = GamsExpressions(family, names).summands(family.family.body)
-        yield from render([*wrap_lines(terms, WIDTH, b"  "), b"\n"], family.count)
+        yield from render([*wrap_lines(terms, WIDTH), b"\n"], family.count)
 
 
 def _rows(problem: Problem, names: Names) -> Iterator[bytes]:

@@ -21,6 +21,7 @@ from ...models.field.field import CrossField
 from ...models.field.jumps import step_labels
 from ...models.instance.angles import double_angle
 from ...models.instance.domain import Bools, Floats
+from ...models.instance.terms import parity_sign
 
 Positions = NDArray[np.complex128]
 Labels = NDArray[np.int64]
@@ -102,21 +103,17 @@ def _lowest_eigenvector(field: CrossField, part: _Array, start: Floats) -> Float
     """The lowest eigenvector of the signed Laplacian with signs (-1)^p, by inverse iteration."""
     # Its signs say which labels are exchanged; its zero lines, the cuts, are short and smooth. A start that
     # changes its sign with the labels makes the result independent of them.
-    from scipy.sparse import csc_array, diags_array
-    from scipy.sparse.linalg import splu
+    from scipy.sparse import csr_array, diags_array
 
-    grid = field.instance.grid
-    signs = csc_array((1.0 - 2.0 * (field.p & 1), (grid.first, grid.second)), shape=(grid.size, grid.size))
-    degree = np.bincount(grid.first, minlength=grid.size) + np.bincount(grid.second, minlength=grid.size)
-    solver = splu(
-        (diags_array(degree + _SHIFT) - signs - signs.T).tocsc(),
-        permc_spec="MMD_AT_PLUS_A",
-        options={"SymmetricMode": True},
-    )
+    from ...models.instance.sparse_systems import factor_matrix
+
+    terms, size = field.instance.pair_terms, field.instance.grid.size
+    signs = csr_array((parity_sign(field.p), (terms.first, terms.second)), shape=(size, size))
+    solve = factor_matrix(diags_array(1.0 * terms.degree(size)) - signs - signs.T, pull=_SHIFT)
     # Weights keep a symmetric start from being orthogonal to the vector.
-    vector: Floats = start * np.random.default_rng(0).random(grid.size)
+    vector: Floats = start * np.random.default_rng(0).random(size)
     for _ in range(_ITERATIONS):
-        vector = solver.solve(vector)
+        vector = solve(vector)
         vector /= np.sqrt(np.bincount(part, vector**2))[part]
     return vector
 

@@ -137,17 +137,13 @@ def outcome_of(log: str) -> Outcome:
     """Return what log and listing of a run state: status, words and dual bound."""
     model, state = (_find_integer(rf"\*\*\*\* {kind} STATUS +(\d+)", log) for kind in ("MODEL", "SOLVER"))
     status, words = status_of_gams(model, state)
-    return Outcome(status, words, _find_number(r"^Best possible *[=:] *(\S+)$", log))
+    best = re.search(r"^Best possible *[=:] *(\S+)$", log, re.MULTILINE)
+    try:
+        return Outcome(status, words, float(best[1]) if best else None)
+    except ValueError:  # NA, or asterisks
+        return Outcome(status, words)
 
 
 def _find_integer(pattern: str, log: str) -> int:
     match = re.search(pattern, log)
     return int(match[1]) if match else 0
-
-
-def _find_number(pattern: str, log: str) -> float | None:
-    match = re.search(pattern, log, re.MULTILINE)
-    try:
-        return float(match[1]) if match else None
-    except ValueError:  # NA, or asterisks
-        return None

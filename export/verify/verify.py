@@ -101,16 +101,12 @@ def verify(
     if not manifests:
         raise InputError("holds no manifest; give the folder that `crossfield export` wrote", file=folder)
     check_targets(folder, [RESULT], force=force)
-    verification = Verification(
-        folder,
-        absent={
-            program_wanted.name: program_wanted.missing for program_wanted in wanted if program_wanted.missing
-        },
-    )
+    absent = {program.name: program.missing for program in wanted if program.missing}
+    verification = Verification(folder, absent=absent)
     with temporary_folder() as temporary:
         subjects, broken = _subjects(manifests, temporary)
         verification.checks.extend(broken)
-        for program in (program_wanted for program_wanted in wanted if not program_wanted.missing):
+        for program in (program for program in wanted if program.name not in absent):
             chosen = [subject for subject in subjects if subject.format in program.formats]
             with Solvers() as solvers:
                 bench = _ProgramChecks(program, solvers, seconds)

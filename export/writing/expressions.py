@@ -169,15 +169,15 @@ class PrefixLanguage(ABC):
         return self.node(operator, parts) if len(parts) > 1 else parts[0]
 
 
-def wrap_lines(summands: Sequence[Pieces], width: int, indent: bytes) -> list[Piece]:
+def wrap_lines(summands: Sequence[Pieces], width: int) -> list[Piece]:
     """The summands with line breaks between them, so that a line exceeds `width` bytes only slightly."""
     pieces: list[Piece] = []
     used = 0
     for summand in summands:
         size = sum(len(piece) if isinstance(piece, bytes) else piece.width for piece in summand)
         if used and used + size > width:
-            pieces.append(b"\n" + indent)
-            used = len(indent)
+            pieces.append(b"\n  ")
+            used = 2
         pieces += summand
         used += size
     return pieces

@@ -24,9 +24,9 @@ def is_packed(path: Path) -> bool:
     return path.suffix.lower() == ".gz"
 
 
-def save_file(path: Path, chunks: Iterable[bytes], *, force: bool = False) -> dict[str, Any]:
+def save_file(path: Path, chunks: Iterable[bytes]) -> dict[str, Any]:
     """Write a file, compressed if `is_packed(path)`; return its size and SHA-256. Raises OutputError."""
-    with pending_file(path, chunks, force=force) as facts:
+    with pending_file(path, chunks) as facts:
         return facts
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from ..instance.domain import Bools, Floats, Ints
-from .families import ANY_DEGREE, PlacedFamily, merge_terms, row_sides
+from .families import PlacedFamily, merge_terms, row_sides
 from .names import Bytes, decode_names
 
 QUADRATIC: Final = 2
@@ -104,8 +104,8 @@ def problem_arrays(
     )
     c = np.zeros(size)
     c[at[:, 0]] = cost
-    entries, values = row_terms(rows, 1, up_to=QUADRATIC)
-    products, factors = row_terms(rows, 2, up_to=QUADRATIC)
+    entries, values = _row_terms(rows, 1)
+    products, factors = _row_terms(rows, 2)
     lower, upper = row_sides(rows)
     a = sparse.csr_array((values, tuple(entries.T)), shape=(len(lower), size))
     a.eliminate_zeros()
@@ -140,19 +140,14 @@ def quadratic_matrix(at: Ints, factor: Floats, size: int) -> sparse.csr_array:
     return matrix
 
 
-def row_terms(
-    families: Iterable[PlacedFamily], degree: int, *, up_to: int = ANY_DEGREE
-) -> tuple[Ints, Floats]:
-    """Terms of a degree of all rows: row and columns, shape (k, degree + 1), and coefficients (k,).
-
-    up_to: greatest degree of the families that are counted.
-    """
+def _row_terms(families: Iterable[PlacedFamily], degree: int) -> tuple[Ints, Floats]:
+    """Terms of a degree of all rows up to quadratic: row and columns (k, degree + 1), coefficients (k,)."""
     at: list[Ints] = [np.zeros((0, degree + 1), np.int32)]
     values: list[Floats] = [np.zeros(0)]
     start = 0
     for family in families:
         row = np.arange(start, start + family.count, dtype=np.int32)
-        for term in family.of_degree(degree) if family.degree <= up_to else ():
+        for term in family.of_degree(degree) if family.degree <= QUADRATIC else ():
             at.append(np.stack([row, *term.factors], axis=1))
             values.append(np.broadcast_to(np.asarray(term.coefficient, dtype=np.float64), (family.count,)))
         start += family.count

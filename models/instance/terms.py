@@ -67,10 +67,10 @@ class PairTerms:
         """Smooth energy 2 (phi(A) + phi(B)) of each pair. size: phi, the square or the absolute value."""
         return self.weighted(2 * (size(self.residual_a(alpha, p)) + size(self.residual_b(beta, p))))
 
-    def least_costs(self, alpha: Floats, beta: Floats, size: np.ufunc = np.square) -> Floats:
+    def least_costs(self, alpha: Floats, beta: Floats) -> Floats:
         """Least smooth energy of each pair over all jumps, shape (m,)."""
         jumps = self.jump_below(alpha) + np.array([[0], [1]], dtype=np.int32)
-        costs: Floats = self.costs(alpha, beta, jumps, size).min(axis=0)
+        costs: Floats = self.costs(alpha, beta, jumps).min(axis=0)
         return costs
 
     def degree(self, points: int) -> Ints:
@@ -78,17 +78,13 @@ class PairTerms:
         ends = np.concatenate([self.first, self.second])
         return np.bincount(ends, minlength=points).astype(np.int32)
 
-    def range_a(self, lower: Floats, upper: Floats, p: Ints | int) -> tuple[Floats, Floats]:
-        """Least and greatest A of each pair where lower <= alpha <= upper, shapes (n,)."""
-        least = lower[self.first] - upper[self.second] + self.offset(p)
-        return least, upper[self.first] - lower[self.second] + self.offset(p)
-
     def jump_range(self, lower: Floats, upper: Floats) -> tuple[Ints, Ints]:
-        """Smallest and greatest useful jump of each pair where lower <= alpha <= upper.
+        """Smallest and greatest useful jump of each pair where lower <= alpha <= upper, shapes (n,).
 
         For every A at jump 0 in its range, the best even and the best odd jump lie between the two.
         """
-        least, greatest = self.range_a(lower, upper, 0)
+        least = lower[self.first] - upper[self.second] + self.offset(0)
+        greatest = upper[self.first] - lower[self.second] + self.offset(0)
         p_min = np.floor(-2 * greatest / np.pi + SLACK).astype(np.int32)
         return p_min, np.ceil(-2 * least / np.pi - SLACK).astype(np.int32)
 

@@ -179,15 +179,8 @@ def _list_regions(colours: Floats) -> Iterator[Bools]:
             for number in np.argsort(-area)[:2]:
                 # The paper round a drawing may be a thin ring.
                 if area[number] >= _LEAST / 4 * label.size:
-                    filled = _fill_holes(ndimage.maximum_filter(label == number, 3))
+                    filled = ndimage.binary_fill_holes(ndimage.maximum_filter(label == number, 3))
                     yield ndimage.maximum_filter(ndimage.minimum_filter(filled, 7), 7)
-
-
-def _fill_holes(region: Bools) -> Bools:
-    from scipy import ndimage
-
-    label, count = ndimage.label(~np.pad(region, 1))
-    return np.asarray(label != label[0, 0])[1:-1, 1:-1] if count > 1 else region
 
 
 def _surround(region: Bools) -> Floats | None:

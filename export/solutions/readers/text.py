@@ -148,13 +148,11 @@ def starts_with(pattern: bytes) -> Callable[[bytes], bool]:
 
 def reader_of(layout: TextLayout, claim: Claim) -> Reader:
     """The reader of a text layout; claim: what its text claims."""
-    return Reader(
-        layout.name, layout.description, layout.recognises, lambda data: _parse_layout(data, layout, claim)
-    )
 
+    def parse(data: bytes) -> RawSolution:
+        return solution_pool([_parse_answer(answer, layout, claim) for answer in layout.answers(data)])
 
-def _parse_layout(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
-    return solution_pool([_parse_answer(answer, layout, claim) for answer in layout.answers(data)])
+    return Reader(layout.name, layout.description, layout.recognises, parse)
 
 
 def _parse_answer(data: bytes, layout: TextLayout, claim: Claim) -> RawSolution:
