@@ -81,15 +81,8 @@ def temporary_folder() -> Iterator[Path]:
 class NewResults:
     """Results that `replace_results` installs at its end.
 
-    Parameters
-    ----------
-    path
-        The temporary folder to write them to.
-    folder
-        Where they go.
-    kept
-        Names of earlier files that stay as they are, whatever the temporary folder holds.
-
+    path: the temporary folder to write them to. folder: where they go. kept: names of earlier files that stay
+    as they are, whatever the temporary folder holds.
     """
 
     path: Path
@@ -111,24 +104,13 @@ def replace_results(
     At the same time, earlier files of the planned names are removed if they are neither replaced nor kept,
     and if they are unchanged since crossfield wrote them. On any failure, Ctrl-C included, all files stay.
 
-    Parameters
-    ----------
-    folder
-        The folder of the results; created if it does not exist.
-    planned
-        Names, relative to the folder, of all files that may be written. They appear in this order.
-    reads
-        Files that the same call reads; they are never replaced, even if forced.
-    force
-        Whether to replace files that crossfield has not written or that have changed since.
+    folder: created if it does not exist. planned: names, relative to it, of all files that may be written, in
+    the order in which they appear. reads: files that the same call reads; they are never replaced, even if
+    forced. force: whether to replace files that crossfield has not written or that have changed since.
 
-    Raises
-    ------
-    OutputError
-        At the beginning, for files in the way, with their names and remedies, and for a folder that cannot
-        be written. At the end, for files that came into the way during the work; the new ones then stay in a
-        folder that the message names.
-
+    Raises OutputError at the beginning, for files in the way, with their names and remedies, and for a folder
+    that cannot be written; and at the end, for files that came into the way during the work. The new ones
+    then stay in a folder that the message names.
     """
     existed, folder, order, reads = os.path.lexists(folder), make_folder(folder), [*planned], tuple(reads)
     check_targets(folder, order, reads=reads, force=force)

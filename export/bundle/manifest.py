@@ -103,11 +103,6 @@ def read_manifest(path: str | Path) -> Manifest:
     path
         A .manifest.json file.
 
-    Returns
-    -------
-    Manifest
-        The manifest.
-
     Raises
     ------
     InputError

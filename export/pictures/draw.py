@@ -99,7 +99,7 @@ def draw(
     up: str | None = None,
     force: bool = False,
 ) -> Path:
-    """Draw an instance, a field or a surface into a file.
+    """Draw an instance, a field or a surface into a file, and return its path.
 
     Parameters
     ----------
@@ -118,11 +118,6 @@ def draw(
     force
         Whether to replace a file that crossfield has not written or that has changed since. The underlay is
         never replaced.
-
-    Returns
-    -------
-    Path
-        The path of the picture.
 
     Raises
     ------

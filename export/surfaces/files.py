@@ -68,9 +68,9 @@ def write_surface(
     about: Mapping[str, Any] | None = None,
     force: bool = False,
 ) -> Path:
-    """Write a surface as pictures, heights, a mesh and a report. Equal surfaces give equal bytes.
+    """Write a surface as pictures, heights, a mesh and a report. Return the folder.
 
-    All files appear together at the end.
+    Equal surfaces give equal bytes. All files appear together at the end.
 
     Parameters
     ----------
@@ -92,11 +92,6 @@ def write_surface(
     force
         Whether to replace files that crossfield has not written or that have changed since. The drawing is
         never replaced.
-
-    Returns
-    -------
-    Path
-        The folder.
 
     Raises
     ------

@@ -1,6 +1,4 @@
-"""A problem: a formulation bound to an instance.
-
-Columns, rows and terms as arrays; values and violations at points.
+"""A problem: a formulation bound to an instance, as arrays, with values and violations at points.
 
 Writers, solvers and readers see a Problem and never a formulation's name. All arrays come from the
 declaration: an expression is split into monomials once per family, index arrays do the rest.
@@ -30,16 +28,7 @@ from .expressions import Operand, expression_of
 from .families import ANY_DEGREE, Block, PlacedFamily, merge_terms
 from .lifting import lift_products
 from .residuals import angles_and_jumps, residual_data
-from .symbols import (
-    NARROWED,
-    SLOTS,
-    VARIABLES,
-    IndexSet,
-    Variable,
-    constants_of,
-    count_elements,
-    values_at,
-)
+from .symbols import NARROWED, SLOTS, VARIABLES, IndexSet, Variable, constants_of, count_elements, values_at
 from .windows import Windows
 
 if TYPE_CHECKING:
@@ -332,61 +321,26 @@ class Problem:
         return self.formulation.is_convex
 
     def merged_objective(self, degree: int, *, up_to: int = ANY_DEGREE) -> tuple[Ints, Floats]:
-        """Monomials of that degree, each set of columns once, sorted.
+        """Monomials of the objective: columns (k, degree), each set once, sorted, and coefficients (k,).
 
+        degree: 0 for the constant, whose k is 1. up_to: greatest degree of the terms that are counted.
         Coefficients that cancel are left out.
-
-        Parameters
-        ----------
-        degree
-            Number of columns of each monomial; 0 for the constant.
-        up_to
-            Greatest degree of the terms of the objective that are counted.
-
-        Returns
-        -------
-        tuple of arrays
-            Columns, shape (k, degree), and coefficients, shape (k,). For the constant k is 1.
-
         """
         return merge_terms(self.objective, degree, self.n_columns, up_to=up_to)
 
     def with_integers_fixed(self, field: CrossField) -> Problem:
         """Return the problem with its integer columns fixed at the jumps of a field: a continuous problem.
 
-        Fixed columns stay, with equal bounds; names and order do not change.
-
-        Parameters
-        ----------
-        field
-            A field on its instance.
-
-        Returns
-        -------
-        Problem
-            The continuous problem.
-
-        Raises
-        ------
-        InstanceError
-            For a field on another instance.
-
+        Fixed columns stay, with equal bounds; names and order do not change. Raises InstanceError for a field
+        on another instance.
         """
         return replace(self, pinned=field)
 
     def to_arrays(self, *, names: bool = True) -> ProblemArrays:
         """Return the problem up to degree 2 as NumPy arrays and SciPy matrices.
 
-        Parameters
-        ----------
-        names
-            Whether to make the names of columns and rows.
-
-        Returns
-        -------
-        ProblemArrays
-            Costs, matrices, bounds and names. `nonlinear` lists the parts that the arrays do not contain.
-
+        names: whether to make the names of columns and rows. `nonlinear` of the arrays lists the parts that
+        they do not contain.
         """
         from .arrays import problem_arrays  # it loads SciPy, which files do not need
         from .names import column_names, row_names
@@ -400,15 +354,8 @@ class Problem:
 
         This and the other conversions hold the same columns and rows, under the names of the files, and the
         stamp, so that `solution` identifies the problem. A QP without rows has one empty row, because HiGHS
-        may otherwise stop far above the optimum.
-
-        Raises
-        ------
-        MissingSolverError
-            Without the package.
-        UnsupportedBySolverError
-            When the problem is neither an LP or MILP nor a convex QP.
-
+        may otherwise stop far above the optimum. Raises MissingSolverError without the package, and
+        UnsupportedBySolverError when the problem is neither an LP or MILP nor a convex QP.
         """
         return above.packages().convert("highs", self)
 
@@ -438,9 +385,7 @@ class Problem:
 
         Variables have indices (row, column) of a pixel, or (row, column, side) of a pair, where side is `u`
         or `r`. On a mesh the indices are numbers of faces and pairs. `start` is a field whose point is the
-        initial value of every variable.
-
-        Raises InstanceError for a start on another instance.
+        initial value of every variable. Raises InstanceError for a start on another instance.
         """
         return above.packages().convert("pyomo", self, start=start)
 
@@ -610,7 +555,7 @@ def _at_field(problem: Problem, name: str, quantities: dict[str, Any]) -> Floats
 
 
 def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options: Any) -> Problem:
-    """Bind a formulation to an instance.
+    """Bind a formulation to an instance. docs/formulations.md has the formulas.
 
     Parameters
     ----------
@@ -624,11 +569,6 @@ def formulate(instance: Instance, name: str, *, p: Ints | None = None, **options
         Where the formulation has them: `facet` (`hull` or `printed`), `stroke_norm` and `beta_norm` (1 or 2),
         `relax` (True makes integers continuous), and `limits` (True cuts off fields that a change of one jump
         improves).
-
-    Returns
-    -------
-    Problem
-        The problem; docs/formulations.md has its formulas.
 
     Raises
     ------

@@ -56,7 +56,7 @@ _OPTIONAL: Final = {
 
 
 def write_instance(instance: Instance, path: str | Path, *, force: bool = False) -> Path:
-    """Write an instance. Equal instances give equal bytes.
+    """Write an instance and return the path. Equal instances give equal bytes.
 
     Parameters
     ----------
@@ -66,11 +66,6 @@ def write_instance(instance: Instance, path: str | Path, *, force: bool = False)
         File to write; the suffix .json or .npz selects the format.
     force
         Whether to replace a file that crossfield has not written or that has changed since.
-
-    Returns
-    -------
-    Path
-        The path.
 
     Raises
     ------
@@ -94,11 +89,6 @@ def read_instance(path: str | Path) -> Instance:
     ----------
     path
         A .json or .npz file that `write_instance` wrote.
-
-    Returns
-    -------
-    Instance
-        The instance.
 
     Raises
     ------

@@ -20,15 +20,8 @@ _FARTHEST: Final = 1e100  # coordinates whose squares are finite numbers
 class Grid(Domain):
     """Pixels of a mask [height, width], numbered row by row, and their ordered neighbour pairs.
 
-    Parameters
-    ----------
-    mask
-        Pixels to solve for, bool (height, width), row 0 at the top.
-    pixel_size
-        Side of a pixel in units of the sketch, 1e-100 to 1e100.
-    origin
-        Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards.
-
+    mask: pixels to solve for, row 0 at the top. pixel_size: side of a pixel in units of the sketch, 1e-100 to
+    1e100. origin: sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards.
     """
 
     mask: Bools

@@ -74,8 +74,8 @@ def _check_weight(name: str, value: float, most: float = MOST_WEIGHT, where: str
 class Instance(Pictured):
     """Points with directions of strokes on some of them, and the weights of the energy.
 
-    It is frozen and validated. Rounding makes instances, and so their hashes, equal on processors that differ
-    in the last digit. Rounding is idempotent. See docs/mathematics.md, 1 and 4. `Instance.on_pixels` and
+    It is frozen and validated. Rounding, which is idempotent, makes instances and their hashes equal on
+    processors that differ in the last digit. See docs/mathematics.md, 1 and 4. `Instance.on_pixels` and
     `Instance.on_faces` make one from positions.
 
     Parameters
@@ -150,7 +150,7 @@ class Instance(Pictured):
         origin: tuple[float, float] = (0.0, 0.0),
         **more: Any,
     ) -> Instance:
-        """Return an instance on the pixels of a sketch.
+        """Return an instance on the pixels of a sketch. Raises as `Instance`.
 
         Parameters
         ----------
@@ -163,13 +163,7 @@ class Instance(Pictured):
         pixel_size
             Side of a pixel in units of the sketch, 1e-100 to 1e100, rounded to 12 digits.
         origin
-            Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y downwards, rounded to 12
-            digits.
-
-        Raises
-        ------
-        InstanceError
-            As in `Instance`.
+            Sketch coordinates (x, y) of the top left corner of pixel [0, 0], y down, rounded to 12 digits.
 
         """
         corner = float_array(origin, "origin", InstanceError)
@@ -185,20 +179,8 @@ class Instance(Pictured):
     def on_faces(cls, name: str, mesh: Mesh, stroke_faces: Any, theta: Any, w: Any, **more: Any) -> Instance:
         """Return an instance on the faces of a mesh; `orthogonal` unless `more` says otherwise.
 
-        Parameters
-        ----------
-        name, theta, w, more
-            As in `Instance`.
-        mesh
-            The mesh.
-        stroke_faces
-            Number of each face with a stroke, int (s,), ascending, each once; there may be none.
-
-        Raises
-        ------
-        InstanceError
-            As in `Instance`.
-
+        stroke_faces: number of each face with a stroke, int (s,), ascending, each once; there may be none.
+        The others are as in `Instance`, and so are the errors.
         """
         return cls(name, mesh, stroke_faces, theta, w, **({"orthogonal": True} | more))
 
@@ -411,11 +393,6 @@ class Instance(Pictured):
             The coefficients on a grid of 24 pixels on its longer side, 0 to 1e6. On another grid they are
             stroke_weight 24 / side and skew_weight (24 / side)^2, and at most 1e6 too. None keeps a weight.
 
-        Returns
-        -------
-        Instance
-            The instance.
-
         Raises
         ------
         InstanceError
@@ -465,25 +442,15 @@ class Instance(Pictured):
 
     @property
     def summary(self) -> str:
-        """Name, domain, strokes, gauge, right angles, and weights unless they are defaults."""
-        return (
-            f"{self.name}: {self.domain.summary}, {len(self.theta)} with strokes, gauge {self.gauge}"
-            f"{', orthogonal' * self.orthogonal}{self._other_weights}{self._prescribed}"
-        )
-
-    @property
-    def _prescribed(self) -> str:
-        return "" if self.indices is None else f", prescribed indices: {len(self.indices)}"
-
-    @property
-    def _other_weights(self) -> str:
-        weights = {"stroke": (self.stroke_weight, STROKE_WEIGHT), "skew": (self.skew_weight, SKEW_WEIGHT)}
-        return "".join(
-            f", {term} weight {weight:g}"
-            for term, (weight, of_sketches) in weights.items()
-            if weight != of_sketches
-            and getattr(self, f"{term}_coefficient") != getattr(Instance, f"{term}_coefficient")
-        )
+        """Name, domain, strokes, gauge, right angles, weights unless they are defaults, and indices."""
+        parts = [f"{self.name}: {self.domain.summary}", f"{len(self.theta)} with strokes, gauge {self.gauge}"]
+        parts += ["orthogonal"] * self.orthogonal
+        for term, usual in (("stroke", STROKE_WEIGHT), ("skew", SKEW_WEIGHT)):
+            coefficient, weight = f"{term}_coefficient", self._weight(term)
+            if weight != usual and getattr(self, coefficient) != getattr(Instance, coefficient):
+                parts.append(f"{term} weight {weight:g}")
+        parts += [] if self.indices is None else [f"prescribed indices: {len(self.indices)}"]
+        return ", ".join(parts)
 
     @cached_property
     def sha256(self) -> str:

@@ -81,11 +81,7 @@ def solve_by_gradients(
 class SimilarSystems:
     """Solves similar symmetric systems one after another, by the factors of an earlier one if few steps do.
 
-    Parameters
-    ----------
-    steps
-        Of conjugate gradients, preconditioned by these factors, after which the present system is factored.
-
+    steps: of conjugate gradients, preconditioned by these factors, after which the present one is factored.
     """
 
     def __init__(self, *, steps: int = 25) -> None:

@@ -61,11 +61,6 @@ def greedy_field(instance: Instance, *, stop: Stop | None = None) -> CrossField:
     stop
         A function that returns whether to stop, or an event. All remaining jumps are then decided at once.
 
-    Returns
-    -------
-    CrossField
-        The field.
-
     """
     if takes_integers(instance):
         return greedy_integer_field(instance, stop_function(stop))

@@ -57,11 +57,6 @@ def random_instance(
     stroke_weight, skew_weight
         Weights that mean the same on every grid, as in `Instance.with_weights`.
 
-    Returns
-    -------
-    Instance
-        The instance.
-
     Raises
     ------
     InputError

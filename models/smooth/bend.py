@@ -82,11 +82,6 @@ def bend_field(
         A function or an event, asked before each round whether to stop. The field of the rounds so far is
         then returned, and `start` before the first round.
 
-    Returns
-    -------
-    CrossField
-        The field.
-
     Raises
     ------
     InputError

@@ -62,11 +62,6 @@ def polyvector_field(instance: Instance, *, hold: float = 1.0, tolerance: float 
         Relative residual of the polynomials, which are then solved without a factorisation in a third of the
         time. None: solve exactly.
 
-    Returns
-    -------
-    CrossField
-        The field.
-
     Raises
     ------
     InputError
@@ -155,11 +150,6 @@ def power_field(instance: Instance, *, steps: int = 0) -> CrossField:
         Number of further solves, in each of which all z, scaled to one length, pull at z like weak strokes.
         Far from strokes z fades away, and its directions improve by this: on five closed meshes of 8,000 to
         20,000 faces, 30 steps lowered the energy by 8 to 15 %.
-
-    Returns
-    -------
-    CrossField
-        The field.
 
     Raises
     ------
