@@ -17,7 +17,7 @@ from ...models.errors import InputError, MissingSolverError, SolutionError, Unsu
 from ...models.formulations.problem import Problem
 from ..solutions.read import check_answer
 from ..solutions.readers.text import RawSolution, named_values, solution_without_point
-from ..solutions.solution import TOLERANCE, Solution
+from ..solutions.solution import TRUSTED, Solution
 from ..statuses import Status, claim_of
 from ..writing.stamps import digits_in_columns, digits_in_text, is_identified
 from .gurobi import GUROBI
@@ -72,7 +72,7 @@ def check_values(
         raw,
         problem,
         identified=True,
-        tolerance=TOLERANCE if tolerance is None else tolerance,
+        tolerance=TRUSTED if tolerance is None else tolerance,
         stated_gap=gap,
         stated_bound=bound,
     )

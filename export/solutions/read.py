@@ -21,7 +21,7 @@ from ..writing.stamps import is_identified
 from .misfit import check_names, check_range
 from .readers.registry import read_raw
 from .readers.text import RawSolution, values_by_name, values_in_order
-from .solution import TOLERANCE, Solution
+from .solution import TRUSTED, Solution
 
 ROUND: Final = 1e-5
 """Largest distance from an integer at which an integer column is rounded; other values are kept."""
@@ -36,7 +36,7 @@ def read_solution(
     problem: Problem,
     *,
     held: Mapping[str, Problem] | None = None,
-    tolerance: float = TOLERANCE,
+    tolerance: float = TRUSTED,
     identified: bool = False,
     solution: int | None = None,
     stated_gap: float | None = None,

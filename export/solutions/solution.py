@@ -24,12 +24,10 @@ from .readers.grammar import AGREEMENT
 TRUSTED: Final = 1e-5
 """Largest violation of a point whose claims are kept, in units of a column (radians, jumps).
 
-By default, solvers leave these errors: HiGHS, GLPK, CBC and Ipopt at most 1e-7; SCIP 1e-6 in rows and 3e-6
-in the objective; CPLEX, Gurobi and Xpress 2e-6 in integers (1e-5 is allowed); BARON 1e-5 in rows.
+A caller may allow a feasible point more; then no claim is kept. By default, solvers leave these errors:
+HiGHS, GLPK, CBC and Ipopt at most 1e-7; SCIP 1e-6 in rows and 3e-6 in the objective; CPLEX, Gurobi and
+Xpress 2e-6 in integers (1e-5 is allowed); BARON 1e-5 in rows.
 """
-
-TOLERANCE: Final = TRUSTED
-"""Largest violation of a feasible point, unless the caller allows more; then no claim is kept."""
 
 ROUNDED: Final = 1e-3
 """Largest violation that a file of few digits explains: listings have four decimals."""
@@ -108,7 +106,7 @@ class Solution:
     seconds: float | None = None
     interrupted: bool = False
     start_returned: bool | None = None
-    tolerance: float = TOLERANCE
+    tolerance: float = TRUSTED
     nodes: int | None = None
     digits: str = ""
     silent: str = ""

@@ -20,7 +20,7 @@ from crossfield.export.solutions.readers import registry
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from crossfield.export.solutions.readers.text import values_by_name, values_in_order
-from crossfield.export.solutions.solution import TOLERANCE
+from crossfield.export.solutions.solution import TRUSTED
 from crossfield.export.statuses import Status
 from crossfield.export.writing.nl_order import NlOrder
 from crossfield.models.input_limits import MAX_SOLUTION
@@ -455,7 +455,7 @@ def bears_out(solution):
     if not solution.status.needs_point or solution.point is None:
         return True
     off, objective = solution.violation, solution.objective
-    if off.rows > 2 * np.pi * TOLERANCE or max(off.bounds, off.integrality) > TOLERANCE:
+    if off.rows > 2 * np.pi * TRUSTED or max(off.bounds, off.integrality) > TRUSTED:
         return False
     reported = objective if solution.reported is None else solution.reported
-    return abs(reported - objective) <= 1.1 * TOLERANCE * max(1, objective)
+    return abs(reported - objective) <= 1.1 * TRUSTED * max(1, objective)

@@ -15,7 +15,7 @@ from crossfield.export.cli.app import invoke, read_command
 from crossfield.export.solutions.readers.ampl import write_ampl_sol
 from crossfield.export.solutions.readers.grammar import AGREEMENT
 from crossfield.export.solutions.readers.registry import read_raw
-from crossfield.export.solutions.solution import TOLERANCE, Solution
+from crossfield.export.solutions.solution import TRUSTED, Solution
 from crossfield.export.solvers_table import SOLVERS
 from crossfield.export.solving.local import SolveFiles, Solvers
 from crossfield.export.statuses import Status
@@ -61,7 +61,7 @@ def reading(skew, tmp_path, capsys):
 
 
 def test_the_answer_of_a_relaxation_is_not_passed_on(skew, reading, tmp_path):
-    assert inspect.signature(read_command).parameters["tolerance"].default == TOLERANCE
+    assert inspect.signature(read_command).parameters["tolerance"].default == TRUSTED
     path = by_highs(skew / f"skew.{MILP}.mps", tmp_path / "relaxed.sol", solve_relaxation=True)
     assert read_raw(path).status == "optimal-in-gap"
     code, facts, complaint, written = reading(path)
