@@ -122,7 +122,7 @@ def write_all(
     force: bool = False,
     progress: Progress = silent,
 ) -> list[Manifest]:
-    """Write formulations of an instance in every format that carries them.
+    """Write formulations of an instance in every format that carries them; one manifest for each.
 
     Parameters
     ----------
@@ -148,11 +148,6 @@ def write_all(
         Whether to replace files that crossfield has not written or that have changed since.
     progress
         Receives the name of each formulation.
-
-    Returns
-    -------
-    list of Manifest
-        One manifest per formulation.
 
     Raises
     ------

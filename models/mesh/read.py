@@ -39,7 +39,8 @@ def read_mesh(
     """Read a triangle mesh as an instance, one cross per face.
 
     Strokes lie on the faces at sharp edges, boundaries and polylines (`l` elements) of an OBJ, and on faces
-    with given directions. A face with several of them gets their mean, for crosses of right angles.
+    with given directions. A face with several of them gets their mean, for crosses of right angles. Strokes
+    have the weight 20.
 
     Parameters
     ----------
@@ -69,11 +70,6 @@ def read_mesh(
         Name of the instance; by default made from the file name.
     gauge
         Window of alpha, as in `Instance`.
-
-    Returns
-    -------
-    Instance
-        The instance, with weight 20 of the strokes.
 
     Raises
     ------

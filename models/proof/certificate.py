@@ -38,7 +38,7 @@ _FEW_LABELS, _MANY_LABELS = 400_000, 30_000_000
 
 
 def write_certificate(proof: Proof, path: str | Path, *, force: bool = False) -> Claim:
-    """Write the certificate of a proof, as far as the checker confirms it.
+    """Write the certificate of a proof, as far as the checker confirms it, and return what it claims.
 
     The certificate may claim less than the proof. The same proof gives the same bytes.
 
@@ -51,11 +51,6 @@ def write_certificate(proof: Proof, path: str | Path, *, force: bool = False) ->
     force
         Whether to replace a file that crossfield has not written or that has changed since, and a certificate
         of a higher bound for the same instance and norm.
-
-    Returns
-    -------
-    Claim
-        What the file claims.
 
     Raises
     ------
@@ -218,7 +213,7 @@ def _last_step_arrays(
 def read_certificate(
     path: str | Path, *, on: Instance | None = None, jobs: int = 1, progress: Progress = silent
 ) -> Claim:
-    """Read and check a certificate.
+    """Read and check a certificate, and return its claim, which holds.
 
     Field, instance, energy, bound and status come from the arrays that the checker has checked.
 
@@ -233,11 +228,6 @@ def read_certificate(
         less than 3 GB.
     progress
         Receives a line of text after each of these levels.
-
-    Returns
-    -------
-    Claim
-        The claim, which holds.
 
     Raises
     ------

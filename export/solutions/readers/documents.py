@@ -42,7 +42,6 @@ DocumentPath = tuple[str | int | None, ...]
 class _DocumentLayout:
     """Paths to the columns and claims of a document; table: its rows in the table of statuses."""
 
-    title: str
     columns: DocumentPath
     status: DocumentPath
     table: str
@@ -52,7 +51,6 @@ class _DocumentLayout:
 
 
 _GUROBI: Final = _DocumentLayout(
-    "Gurobi .json",
     ("Vars",),
     ("SolutionInfo", "Status"),
     "gurobi-json",
@@ -62,9 +60,8 @@ _GUROBI: Final = _DocumentLayout(
 )
 _CLAIMS: Final = {"status", "objective", "bound"}
 _OTHERS: Final = (
-    _DocumentLayout("PuLP", ("variables",), ("parameters", "sol_status"), "pulp"),
+    _DocumentLayout(("variables",), ("parameters", "sol_status"), "pulp"),
     _DocumentLayout(
-        "Pyomo",
         ("Solution", 1, "Variable"),
         ("Solver", 0, "Termination condition"),
         "other",
@@ -93,9 +90,8 @@ def parse_document(data: bytes) -> RawSolution:
     inner = next((key for key in ("variables", "values", "solution") if key in content), "columns")
     if inner == "columns":
         content |= {inner: {key: value for key, value in content.items() if key not in _CLAIMS}}
-    return _solution(
-        content, _DocumentLayout("plain", (inner,), ("status",), "other", ("objective",), ("bound",))
-    )
+    layout = _DocumentLayout((inner,), ("status",), "other", ("objective",), ("bound",))
+    return _solution(content, layout)
 
 
 def _columns_of_frame(content: dict[str, Any]) -> dict[str, Any]:

@@ -204,9 +204,8 @@ def _number(scan: Scan, group: str) -> float | None:
 
 
 class Entries(NamedTuple):
-    """Names, values and indices of entries, as far as their form has them, and the position after them."""
+    """Values of entries, indices as far as their form has them, and the position after them."""
 
-    names: Bytes
     values: Floats
     numbers: Ints
     end: int
@@ -214,13 +213,12 @@ class Entries(NamedTuple):
 
 def read_entries(data: bytes, start: int, form: EntryForm) -> Entries:
     """The lines of a text that are entries, from a byte position on; a line without an end is none."""
-    names, values, index, end = [np.empty(0, "S1")], [np.empty(0)], [np.empty(0, np.int64)], start
+    values, index, end = [np.empty(0)], [np.empty(0, np.int64)], start
     for stop, words in form.read(data, start):
         end = stop
-        names.append(np.array(form.column(words, "name") or np.empty(0, "S1")))
         values.append(float_values(form.column(words, "value")))
         index.append(float_values(form.column(words, "index")).astype(np.int64))
-    return Entries(np.concatenate(names), np.concatenate(values), np.concatenate(index), end)
+    return Entries(np.concatenate(values), np.concatenate(index), end)
 
 
 def float_values(words: list[bytes]) -> Floats:
