@@ -8,7 +8,6 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import DomainError
 from folders import contents
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -149,7 +148,7 @@ def test_a_picture_is_drawn(suffix, picture, name, tmp_path):
     subject = instance if picture == "instance" else any_field(instance)
     paths = [tmp_path / f"{count}{suffix}" for count in range(2)]
     if on_mesh(instance) and picture not in OF_MESH:
-        with pytest.raises(DomainError, match="choose one of instance, crosses"):
+        with pytest.raises(cf.InstanceError, match="choose one of instance, crosses"):
             cf.draw(subject, paths[0], kind=picture)
         assert not contents(tmp_path)
         return
@@ -164,7 +163,7 @@ def test_a_picture_is_drawn(suffix, picture, name, tmp_path):
 def test_a_surface_is_written(name, tmp_path):
     field = any_field(kind(name))
     if on_mesh(field.instance):
-        with pytest.raises(DomainError):
+        with pytest.raises(cf.InstanceError, match="on the faces of a mesh"):
             cf.surface(field)
         return
     surface = cf.surface(field)

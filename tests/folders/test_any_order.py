@@ -12,7 +12,7 @@ from pathlib import Path
 
 import crossfield as cf
 import pytest
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.models.written_files import MARK, is_unchanged
 from folders import contents
 from hypothesis import Phase, settings

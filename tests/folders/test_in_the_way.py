@@ -5,7 +5,7 @@ from functools import cache
 
 import crossfield as cf
 import pytest
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from folders import contents
 from instance_kinds import kind
 from loops import for_each
@@ -19,8 +19,8 @@ def source(tmp_path_factory):
     return write_inputs(tmp_path_factory.mktemp("source"))
 
 
-QUICK = ("instance", "mask", "export", "greedy", "read mesh", "draw", "shade")
-SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("solver", "prove", "run")]
+QUICK = ("instance", "mask", "export", "greedy", "read mesh", "draw")
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("shade", "solver", "prove", "run")]
 
 
 @pytest.mark.parametrize("name", [*QUICK, *SLOW])
@@ -198,7 +198,10 @@ def test_prove_keeps_the_better_field_and_the_better_certificate(tmp_path, capsy
     assert contents(tmp_path) != best
 
 
-@pytest.mark.parametrize("limits", [cf.Limits(30.0, gap=0.9), cf.Limits(1e-6)], ids=["worse", "none"])
+@pytest.mark.parametrize(
+    "limits",
+    [pytest.param(cf.Limits(30.0, gap=0.9), id="worse", marks=pytest.mark.slow), cf.Limits(1e-6)],
+)
 def test_answers_of_a_solver_stay_with_their_log(tmp_path, limits):
     """At a gap of 90 %, HiGHS ends with a point that is far from the optimum; without time, with none."""
     problem = cf.formulate(cf.sample("mouse", 3), "milp-mccormick")

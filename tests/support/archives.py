@@ -16,6 +16,11 @@ def members_of(archive: bytes) -> dict[str, bytes]:
         return {name: held.read(name) for name in held.namelist()}
 
 
+def pack_arrays(arrays: dict[str, np.ndarray]) -> bytes:
+    """The bytes of an .npz."""
+    return packed([(f"{name}.npy", npy(array)) for name, array in arrays.items()])
+
+
 def packed(members: list[tuple[str, bytes]], method: int = zipfile.ZIP_DEFLATED) -> bytes:
     """A .zip of names and contents; names may be there twice."""
     buffer = io.BytesIO()

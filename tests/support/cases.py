@@ -7,17 +7,15 @@ from typing import Any
 
 import crossfield as cf
 import numpy as np
-from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.formulations.choice import list_formulations
-from crossfield.models.formulations.problem import Problem
-from crossfield.models.instance.angles import QUARTER
-from crossfield.models.instance.domain import Floats
+from angles import QUARTER
+from command_line import listed
 from meshes import box, tetrahedron
 
-SKEWED = list_formulations()
-"""The formulations of crosses that may be skewed."""
-RIGHT = [name for name in FORMULATIONS if name not in SKEWED]
-"""Those of orthogonal crosses only."""
+FORMULATIONS = [row["name"] for row in listed()["formulations"]]
+RIGHT = [name for name in FORMULATIONS if name.endswith(("-orthogonal", "-cycle"))]
+"""The formulations of orthogonal crosses only."""
+SKEWED = [name for name in FORMULATIONS if name not in RIGHT]
+"""Those of crosses that may be skewed."""
 
 OPTIONS = {
     "relax": [True],
@@ -77,17 +75,17 @@ def make_field(instance: cf.Instance, seed: int = 2) -> cf.CrossField:
     return cf.improved_field(field.with_best_jumps()) if instance.orthogonal else field
 
 
-def make_problem(name: str, instance: cf.Instance, **options: Any) -> Problem:
+def make_problem(name: str, instance: cf.Instance, **options: Any) -> Any:
     """The problem of that formulation, with the jumps of the random field where they are data."""
     return cf.formulate(instance, name, p=make_field(instance).p if name == "qp-fixed" else None, **options)
 
 
-def points_of(problem: Problem, count: int = 20, seed: int = 3) -> Floats:
+def points_of(problem: Any, count: int = 20, seed: int = 3) -> np.ndarray:
     """Random points (count, columns), with no regard to bounds, rows and integrality."""
     return np.random.default_rng(seed).normal(size=(count, problem.n_columns))
 
 
-def write_point(path: Path, problem: Problem, point: Floats) -> Path:
+def write_point(path: Path, problem: Any, point: np.ndarray) -> Path:
     """Write a list of names and values as any program might."""
     pairs = zip(problem.to_arrays().column_names.tolist(), point.tolist(), strict=True)
     path.write_text("".join(f"{name} {value!r}\n" for name, value in pairs))

@@ -4,8 +4,8 @@ a second opinion on greedy fields and searches.
 
 import crossfield as cf
 import numpy as np
+from angles import HALF, QUARTER
 from crossfield.models.field.jumps import best_jumps
-from crossfield.models.instance.angles import HALF, QUARTER
 from crossfield.models.instance.terms import parity_sign
 from crossfield.models.search.box_qp import fit_in_box
 

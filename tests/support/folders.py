@@ -2,7 +2,8 @@
 
 from itertools import count
 
-from crossfield.models.written_files import LIST
+LIST = ".crossfield.sha256"
+"""The name of crossfield's list of the files that it wrote to a folder."""
 
 
 def contents(folder):

@@ -6,8 +6,7 @@ import sys
 import warnings
 from pathlib import Path
 
-from crossfield.export.cli.app import invoke
-from crossfield.models.storage import remove_unfinished
+from command_line import invoke
 
 WATCHED = {
     "open",
@@ -21,8 +20,8 @@ WATCHED = {
 }
 
 
-def run_forked(work, folder, ends=None, at=0):
-    """Call a function in a forked process and return its exit code, negative if a signal ended it.
+def run_command(arguments, folder, ends=None, at=0):
+    """Run a command line in a forked process and return its exit code, negative if a signal ended it.
 
     ends: SIGINT or SIGKILL just before the `at`-th operation on a file in the folder; None: never. The output
     goes nowhere.
@@ -35,18 +34,12 @@ def run_forked(work, folder, ends=None, at=0):
             silence()
             if ends is not None:
                 sys.addaudithook(ending_hook(Path(folder).absolute(), ends, at))
-            code = work()
+            code = invoke([str(argument) for argument in arguments])
         except KeyboardInterrupt:
             code = 130
         finally:
-            remove_unfinished()
             os._exit(code)
     return os.waitstatus_to_exitcode(os.waitpid(process, 0)[1])
-
-
-def run_command(arguments, folder, ends=None, at=0):
-    """Run a command line as `run_forked`."""
-    return run_forked(lambda: invoke([str(argument) for argument in arguments]), folder, ends, at)
 
 
 def silence():

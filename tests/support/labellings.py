@@ -1,7 +1,7 @@
 """The discrete problem of a lattice in dense tables, and its least value over all labellings."""
 
 import numpy as np
-from crossfield.models.instance.angles import HALF
+from angles import HALF
 
 
 def discrete(lattice):

@@ -7,7 +7,7 @@ from crossfield.export.library.building.verification import verify_library
 from crossfield.export.library.contributions.points import add_points
 from crossfield.export.library.documents.documents import problem_of, read_library
 from crossfield.export.library.plan.spec import read_spec
-from crossfield.models.written_files import LIST
+from folders import LIST
 
 HEAD = 'format = "crossfield-library-spec"\nversion = 1\ntitle = "a library for tests"\n'
 OPEN = """formulations = ["milp", "bilin1", "miqp", "exact", "cubic", "qp"]

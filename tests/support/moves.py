@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from crossfield.models.instance.angles import HALF
+from angles import HALF
 from crossfield.models.search.stroked_parts import move_to_grid
 
 

@@ -3,13 +3,12 @@
 from functools import cache
 
 import numpy as np
-from crossfield.models.instance.angles import line_difference
+from angles import line_difference
 from crossfield.models.sketch.curves import flatten
 from crossfield.models.sketch.drawing_file import parse_drawing
-from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
 from scipy import ndimage
-from small_drawings import png, read
+from small_drawings import png, read, sample_svg
 
 BLACK, RED, WHITE = (30, 30, 34), (200, 38, 45), (250, 249, 245)
 PAPERS = {"white": (236, 234, 228), "kraft": (176, 138, 98), "blue": (38, 74, 140), "black": (34, 36, 38)}

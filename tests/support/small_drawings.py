@@ -2,6 +2,7 @@
 
 import io
 import tempfile
+from importlib.resources import files
 from pathlib import Path
 
 import crossfield as cf
@@ -30,6 +31,11 @@ def svg(body, head='viewBox="0 0 100 100"'):
         '<svg xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
         f'xmlns:inkscape="http://www.inkscape.org/namespaces/inkscape" {head}>{body}</svg>'
     ).encode()
+
+
+def sample_svg(name):
+    """The SVG text of a built-in sketch."""
+    return (files("crossfield") / f"models/sketch/drawings/{name}.svg").read_text("utf-8")
 
 
 def png(image, kind="PNG", **options):

@@ -10,8 +10,8 @@ import crossfield as cf
 import pytest
 from cases import make_instance
 from children import complaints
-from crossfield.export.cli.app import invoke
-from crossfield.models.written_files import LIST
+from command_line import invoke
+from folders import LIST
 from loops import for_each
 from meshes import box, write_obj
 from moves import turned
@@ -184,9 +184,7 @@ def test_solutions_without_a_point_are_refused(files, refused, instance):
 
 def in_child(*arguments, prelude=""):
     """Run a command line in a child process, after some lines of Python."""
-    code = (
-        f"import sys\n{prelude}\nfrom crossfield.export.cli.app import invoke\nsys.exit(invoke(sys.argv[1:]))"
-    )
+    code = f"import runpy, sys\n{prelude}\nrunpy.run_module('crossfield', run_name='__main__')"
     command = [sys.executable, "-c", code, *map(str, arguments)]
     return subprocess.run(command, capture_output=True, text=True, check=False)
 

@@ -3,47 +3,40 @@
 import re
 import shlex
 
+import crossfield as cf
 import pytest
-import typer
 from answers import by_highs
-from crossfield.export.cli.app import app, invoke
-from crossfield.export.formats.registry import FORMATS
-from crossfield.export.library.plan.spec import RUNGS
-from crossfield.export.pictures.draw import KINDS
-from crossfield.export.runs.methods import METHODS
-from crossfield.export.solvers_table import PROGRAMS, SOLVERS
+from command_line import examples, invoke
 from libraries import write_spec
 
-NAMED = {
-    "solve": {*METHODS, *SOLVERS} - {"prove"},
-    "verify": PROGRAMS,
-    "library get": RUNGS,
-    "library solve": {*SOLVERS, *RUNGS},
-    "export": FORMATS,
-    "draw": KINDS,
+UNKNOWN = {
+    "solve": ("solve skew -m none -o a", "solve skew -f qp-fixed --solver none -o a"),
+    "verify": ("verify . --program none",),
+    "library get": ("library get --rung none -o a",),
+    "library solve": ("library get --rung none -o a", "library solve . --solver none"),
+    "export": ("export skew -F none -o a",),
+    "draw": ("draw it.json -o a.png --kind none",),
 }
-"""Names that the help of a command states."""
+"""By command: lines with an unknown name, whose refusals state the names that the help has to state."""
 
 
-def commands_of(group=None, prefix=""):
-    """All commands by name."""
-    for name, command in (group or typer.main.get_command(app)).commands.items():
-        if hasattr(command, "commands"):
-            yield from commands_of(command, f"{name} ")
-        else:
-            yield f"{prefix}{name}", command
-
-
-def test_the_help_fits_80_columns_and_lists_the_names_of_tables(monkeypatch, capsys):
+def test_the_help_fits_80_columns_and_lists_the_names_of_tables(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    cf.write_instance(cf.sample("skew", 4), "it.json")
+    commands = ["", "library", *dict(examples())]
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setenv("TERM", "dumb")
-    for command in ("", "library", *(name for name, _ in commands_of())):
+    for command in commands:
         assert invoke([*command.split(), "--help"]) == 0
         shown = capsys.readouterr().out
         assert max(map(len, shown.splitlines())) <= 80, command
         words = re.sub(r"(?<=\w-)[\s│]+(?=\w)", "", shown)
-        missing = [name for name in NAMED.get(command, ()) if not re.search(rf"(?<![\w-]){name}\b", words)]
-        assert missing == [], command
+        for line in UNKNOWN.get(command, ()):
+            assert invoke(line.split()) == 1
+            names = {*re.findall(r"[\w-]+", capsys.readouterr().err.partition("; choose one of ")[2])}
+            assert len(names) > 3
+            missing = [name for name in names if not re.search(rf"(?<![\w-]){name}\b", words)]
+            assert set(missing) <= {"prove"}, command  # a command of its own
 
 
 SPECIFICATION = """formulations = ["milp-mccormick", "miqp-exact"]
@@ -65,9 +58,9 @@ def test_examples_run(tmp_path, monkeypatch):
     """
     monkeypatch.chdir(tmp_path)
     write_spec(tmp_path, SPECIFICATION).rename("small.toml")
-    for name, command in commands_of():
+    for name, example in examples():
         if name == "read":
             by_highs("files/skew.milp-mccormick.mps", "skew.sol")
         if name not in {"run", "studio"}:
-            program, *arguments = shlex.split(command.epilog.removeprefix("Example: "))
+            program, *arguments = shlex.split(example)
             assert (program, invoke(arguments)) == ("crossfield", 0), name

@@ -13,8 +13,8 @@ from pathlib import Path
 import crossfield as cf
 import numpy as np
 import pytest
+from archives import pack_arrays
 from crossfield.models import input_limits
-from crossfield.models.array_archive import pack_arrays
 from crossfield.models.instance.file import instance_arrays
 from crossfield.models.sketch.svg import read_svg
 from instance_kinds import kind

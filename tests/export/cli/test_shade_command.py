@@ -5,11 +5,15 @@ import json
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import invoke
-from crossfield.export.surfaces.files import FILES
+from command_line import invoke
 from folders import contents
 from loops import for_each
 from PIL import Image
+
+FILES = (
+    *("normals.png", "shaded.png", "overlay.png", "drawing.png"),
+    *("heights.npy", "surface.obj", "surface.mtl", "surface.json"),
+)
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,8 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import invoke
-from crossfield.models.instance.instance import MOST_WEIGHT
-from crossfield.models.sketch.samples import sample_svg
+from command_line import invoke
+from small_drawings import sample_svg
 
 GIVEN = ["--stroke-weight", "10", "--skew-weight", "1e-4"]
 WEIGHTS = {"stroke_weight": 10.0, "skew_weight": 1e-4}
@@ -33,13 +32,13 @@ def test_a_sketch_a_sample_and_an_instance_file_get_the_weights(tmp_path):
 
 
 def test_the_greatest_weights_depend_on_the_size_of_the_grid():
-    for name, most in (("stroke_weight", MOST_WEIGHT / 6), ("skew_weight", MOST_WEIGHT / 36)):
+    for name, most in (("stroke_weight", 1e6 / 6), ("skew_weight", 1e6 / 36)):
         with pytest.raises(
             cf.InstanceError, match=rf"{name} is 1000000.0; .* and {most:g} on a grid of 4 pixels"
         ):
-            cf.sample("skew", 4, **{name: MOST_WEIGHT})
+            cf.sample("skew", 4, **{name: 1e6})
         assert getattr(cf.sample("skew", 4, **{name: most}), name) == pytest.approx(most)
-        assert cf.sample("skew", 24, **{name: MOST_WEIGHT}).stroke_coefficient > 0
+        assert cf.sample("skew", 24, **{name: 1e6}).stroke_coefficient > 0
 
 
 def test_a_weight_means_the_same_on_every_grid():

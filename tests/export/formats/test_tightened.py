@@ -7,7 +7,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from cases import SKEWED
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.models.formulations.catalogue import FORMULATIONS
 from crossfield.models.formulations.windows import Windows

@@ -18,13 +18,13 @@ import numpy as np
 import pytest
 from cases import SKEWED
 from children import command_lines, complaints, descendants
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.library.building import fields
 from crossfield.export.library.building.build import build, rebuild
 from crossfield.export.library.documents.lock import library_lock
 from crossfield.export.library.documents.statistics import tangent_bound
 from crossfield.models.formulations.catalogue import FORMULATIONS
-from crossfield.models.written_files import LIST
+from folders import LIST
 from libraries import content, defects, document, library_of, problem, spec_of, write_spec
 from processors import PROCESSORS
 

@@ -6,7 +6,7 @@ import sys
 
 import pytest
 from clusters import cluster
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from libraries import content, document, library_of, write_spec
 
 SPEC = """[rungs.tiny]

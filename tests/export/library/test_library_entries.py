@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import crossfield as cf
 import pytest
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.library.building.build import build
 from crossfield.export.library.building.shipped_entries import SHIPPED
 from crossfield.export.library.ledger.points import complete_point

@@ -7,8 +7,7 @@ from urllib.parse import unquote
 
 import pytest
 from browsing import CONTRAST, find, served, show, sideways
-from crossfield.export.library.building.build import build
-from libraries import library_of, spec_of
+from libraries import build, library_of, spec_of
 
 RAND = """[[sketches]]
 name = "rand"

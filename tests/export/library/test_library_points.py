@@ -9,7 +9,7 @@ from dataclasses import replace
 import crossfield as cf
 import pytest
 from children import complaints
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.library.building import fields
 from forging import change
 from libraries import content, defects, document, improve, library_of, problem, write_spec

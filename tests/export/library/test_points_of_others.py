@@ -8,7 +8,7 @@ import crossfield as cf
 import pytest
 from answers import by_highs
 from children import complaints
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.library.documents import check_point
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from forging import change

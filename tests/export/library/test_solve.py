@@ -8,7 +8,7 @@ from itertools import combinations
 import crossfield as cf
 import pytest
 from children import complaints
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.cli.library_command import solve_command
 from crossfield.export.library.contributions.solve import solve_library
 from crossfield.export.library.ledger.grades import (
@@ -21,7 +21,7 @@ from crossfield.export.library.ledger.grades import (
 )
 from crossfield.export.library.ledger.ledger import Record, add_record, read_ledger
 from crossfield.export.solvers_table import SOLVERS
-from crossfield.models.written_files import LIST
+from folders import LIST
 from libraries import OPEN, content, defects, document, library_of, rebuild
 
 MILP, BILINEAR, OTHER = "cf_rand_n004_s6_milp", "cf_rand_n004_s6_bilin1", "cf_rand_n004_s7_milp"

@@ -4,7 +4,7 @@ import json
 
 import pytest
 from children import complaints
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.library.plan.instances import make_instance
 from crossfield.export.library.plan.recipe import plan_library
 from crossfield.export.library.plan.spec import DEFAULT, default_spec, read_spec

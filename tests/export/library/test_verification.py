@@ -7,7 +7,7 @@ from functools import partial
 
 import pytest
 from children import complaints
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.library.building import entry_files
 from crossfield.export.library.building.build import build

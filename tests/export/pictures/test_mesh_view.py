@@ -3,8 +3,6 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import DomainError
-from crossfield.models.mesh.shapes import MESHES
 from meshes import flat_sheet
 from PIL import Image
 from scipy import ndimage
@@ -14,7 +12,7 @@ POSITIVE, NEGATIVE = (0xD1, 0x24, 0x2F), (0x30, 0x56, 0xD3)
 
 def along_the_edges(name):
     """The field of a body of cubes whose lines are parallel to its edges: corners are its singularities."""
-    mesh = MESHES[name][1]()
+    mesh = cf.sample(name).mesh
     upright = np.abs(mesh.normals[:, 2]) > 0.5
     direction = np.where(upright[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     every = np.arange(mesh.size)
@@ -34,13 +32,13 @@ def test_a_cube_shows_seven_of_its_eight_corners_and_no_underlay(tmp_path):
     assert sorted(field.singularities.index.tolist()) == [0.25] * 8
     path = cf.draw(field, tmp_path / "cube.png")
     assert (dots(path, POSITIVE), dots(path, NEGATIVE)) == (7, 0)
-    with pytest.raises(DomainError, match="leave the underlay out"):
+    with pytest.raises(cf.InstanceError, match="leave the underlay out"):
         cf.draw(field, tmp_path / "field.svg", underlay="mouse")
 
 
 def test_the_axis_upwards_only_names_the_axes_anew(tmp_path):
     """A bracket whose y or x axis takes the place of z gives the picture of the upright one."""
-    bracket = MESHES["bracket"][1]()
+    bracket = cf.sample("bracket").mesh
     pictures = []
     for turns, up in enumerate(("z", "x", "y")):
         mesh = cf.Mesh(np.roll(bracket.vertices, turns, axis=1), bracket.faces)
@@ -56,8 +54,8 @@ def test_the_axis_upwards_only_names_the_axes_anew(tmp_path):
 
 
 def test_crosses_are_as_dense_where_faces_are_small(tmp_path):
-    coarse, fine = flat_sheet(10, 10), flat_sheet(80, 80)
-    vertices = np.concatenate([coarse.vertices, fine.vertices / 8 + (10, 0, 0)])
+    coarse, fine = flat_sheet(10, 10), flat_sheet(40, 40)
+    vertices = np.concatenate([coarse.vertices, fine.vertices / 4 + (10, 0, 0)])
     mesh = cf.Mesh(vertices, np.concatenate([coarse.faces, fine.faces + len(coarse.vertices)]))
     instance = cf.Instance.on_faces("both", mesh, [], [], [])
     along = mesh.angle_in(np.arange(mesh.size), np.tile([1.0, 0, 0], (mesh.size, 1)))

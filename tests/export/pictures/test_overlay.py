@@ -8,7 +8,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.pictures.underlay import INK, read_underlay
 from defusedxml import ElementTree
 from layered import SVG, layers_of, lines_in, numbers

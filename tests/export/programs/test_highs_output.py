@@ -7,13 +7,13 @@ import sys
 import pytest
 
 PROGRAM = """
-import json, sys, crossfield as cf
-from crossfield.export.cli.app import invoke
+import json, runpy, sys, crossfield as cf
 problem = cf.formulate(cf.sample("skew", 4), "milp-mccormick")
 model = problem.to_highs()
 model.run()
 print(json.dumps({"status": problem.solution(model).status}), flush=True)
-invoke(["solve", "skew", "--size", "4", "-f", "milp-mccormick", "--json", "-o", sys.argv[1]])
+sys.argv[1:] = ["solve", "skew", "--size", "4", "-f", "milp-mccormick", "--json", "-o", sys.argv[1]]
+runpy.run_module("crossfield", run_name="__main__")
 """
 
 

@@ -13,7 +13,7 @@ def two_parts(tmp_path_factory):
     On eight pixels and with a small weight the MILP is solved long before the time limit.
     Tests may add files.
     """
-    from crossfield.export.cli.app import invoke
+    from command_line import invoke
     from folders import contents
     from PIL import Image, ImageDraw
 

@@ -5,7 +5,7 @@ import json
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.runs.methods import METHODS, Request
 from crossfield.models.processes.deadline import Deadline
 from folders import contents

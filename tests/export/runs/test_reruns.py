@@ -10,8 +10,8 @@ import sys
 import crossfield as cf
 import pytest
 from children import complaints
-from crossfield.export.cli.app import invoke
-from crossfield.models.written_files import LIST
+from command_line import invoke
+from folders import LIST
 from PIL import Image
 
 RUN = """

@@ -10,8 +10,7 @@ import crossfield as cf
 import pytest
 from cases import SKEWED
 from children import complaints
-from crossfield.export.cli.app import invoke
-from crossfield.export.formats.registry import FORMATS
+from command_line import invoke, listed
 from meshes import box, write_obj
 
 FILES = {
@@ -36,7 +35,8 @@ def test_a_run_writes_all_files_and_reports_separate_parts(two_parts):
     assert ("no shaded surface: " in out) == (not shaded)
     models = {name.removeprefix("models/") for name in written if name.startswith("models/")}
     assert {name.split(".")[1] for name in models} == {"instance", *SKEWED}
-    assert report["files"] == sum(Path(name).suffix[1:] in FORMATS for name in models)
+    formats = {row["name"] for row in listed()["formats"]}
+    assert report["files"] == sum(Path(name).suffix[1:] in formats for name in models)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ import crossfield as cf
 import pytest
 from browsing import CONTRAST, find, served, show, sideways
 from cases import write_point
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 
 pytestmark = pytest.mark.slow
 

@@ -7,7 +7,7 @@ import zipfile
 import crossfield as cf
 import pytest
 from answers import listed, problem
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.formats.registry import FORMATS
 from crossfield.export.solutions.readers.registry import parse_raw, read_raw
 from loops import for_each

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import crossfield as cf
 import pytest
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.runs.methods import METHODS, Request
 from crossfield.export.solutions.readers.registry import parse_raw
 from crossfield.models.search.starts import first_field

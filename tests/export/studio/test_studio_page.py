@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 from browsing import CONTRAST, find, show, sideways
 from children import running
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.studio.document import Document
 from crossfield.export.studio.session import hints_on_mask, read_drawn
-from crossfield.models.sketch.samples import sample_svg
 from PIL import Image, ImageDraw
-from small_drawings import png
+from small_drawings import png, sample_svg
 from studio_pages import BOX, banner, document, drag, load, opened, pebble, press, settled, tool, until, write
 from studios import CROSSED, PEBBLE, studio
 

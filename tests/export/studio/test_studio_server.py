@@ -7,7 +7,7 @@ import re
 import threading
 
 import pytest
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from loops import for_each
 from studios import PEBBLE, changed, studio
 

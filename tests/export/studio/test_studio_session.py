@@ -25,11 +25,10 @@ from crossfield.export.studio.session import (
     read_drawn,
 )
 from crossfield.export.studio.views import field_step, surface_step
-from crossfield.models.sketch.samples import sample_svg
 from loops import for_each
 from photographs import assert_same_drawing, draw_sheet, encode, photograph
 from PIL import Image, ImageDraw
-from small_drawings import png
+from small_drawings import png, sample_svg
 from studios import CROSSED, PEBBLE, changed
 
 

@@ -3,8 +3,8 @@
 import crossfield as cf
 import numpy as np
 import pytest
+from angles import HALF, QUARTER
 from crossfield.models.field.field import field_in_windows
-from crossfield.models.instance.angles import HALF, QUARTER
 from exhaustive import random_field, random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -44,7 +44,7 @@ def test_45_degrees_are_not_narrow(skew):
     assert field.facts()["lines_under_45_degrees"] == 0
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(SEEDS, st.sampled_from(["strokes", "box"]))
 def test_best_jumps_beat_every_jump_in_the_bounds(seed, gauge):
     instance = random_instance(seed, gauge=gauge)
@@ -60,7 +60,7 @@ def test_best_jumps_beat_every_jump_in_the_bounds(seed, gauge):
     assert field.pixel_energy.sum() == pytest.approx(2 * mine.sum(), abs=1e-9)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(SEEDS, st.sampled_from([1, 2]))
 def test_energies_do_not_depend_on_the_labels(seed, norm):
     field = random_field(random_instance(seed), seed)

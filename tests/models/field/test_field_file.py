@@ -5,7 +5,7 @@ import json
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.array_archive import pack_arrays
+from archives import pack_arrays
 from damage import change, full_instance, refused, without
 from exhaustive import random_field
 from loops import for_each

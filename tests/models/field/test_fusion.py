@@ -6,9 +6,9 @@ from itertools import product
 import crossfield as cf
 import numpy as np
 import pytest
+from angles import HALF
 from crossfield.models.field.fusion import fuse_fields
 from crossfield.models.field.jumps import free_jumps
-from crossfield.models.instance.angles import HALF
 from crossfield.models.instance.instance import MOST_WEIGHT
 from exhaustive import random_instance, sketch
 

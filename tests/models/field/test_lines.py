@@ -3,14 +3,14 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.instance.angles import HALF, line_difference
+from angles import HALF, line_difference
 from exhaustive import assert_feasible, random_instance
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 
 @given(seed=st.integers(0, 2**32 - 1), gauge=st.sampled_from(["strokes", "box"]))
-@settings(max_examples=50)
+@settings(max_examples=20)
 def test_turns_and_the_order_of_the_lines_do_not_matter(seed, gauge):
     rng = np.random.default_rng(seed)
     instance = random_instance(seed, gauge=gauge)

@@ -8,8 +8,9 @@ import crossfield as cf
 import numpy as np
 import pytest
 import sympy as sp
+from angles import HALF, QUARTER
 from cases import MASKS, RIGHT, make_field, make_instance, make_problem
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.models.formulations import symbols as n
 from crossfield.models.formulations.catalogue import CUBIC, PARITY, QUARTIC
 from crossfield.models.formulations.choice import declare
@@ -17,7 +18,6 @@ from crossfield.models.formulations.expressions import PI, Symbol, cos, floor, p
 from crossfield.models.formulations.latex import to_sympy
 from crossfield.models.formulations.lifting import lift_products
 from crossfield.models.formulations.symbols import VARIABLES
-from crossfield.models.instance.angles import HALF, QUARTER
 from instance_kinds import grid
 from loops import for_each
 

@@ -6,7 +6,6 @@ import crossfield as cf
 import numpy as np
 import pytest
 from cases import make_instance
-from crossfield.models.instance.instance import GAUGES
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loops import for_each
@@ -122,7 +121,7 @@ def test_numbers_are_rounded_once():
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=20)
 def test_rounding_changes_nothing_twice(seed):
     rng = np.random.default_rng(seed)
     theta = rng.choice([1.0, 1e-9, 1e5, np.pi / 4, np.pi]) * rng.integers(-9, 10, 2) + rng.choice(
@@ -133,7 +132,7 @@ def test_rounding_changes_nothing_twice(seed):
         "w": 10 ** rng.uniform(-15, 0, 2),
         "origin": tuple(rng.normal(size=2) * 1e9),
     }
-    for gauge in GAUGES:
+    for gauge in ("strokes", "box"):
         once = cf.Instance.on_pixels(**facts, gauge=gauge)
         assert replace(once).sha256 == once.sha256
         assert ((once.theta == 0) | ((once.theta >= 1e-8) & (once.theta <= np.pi - 1e-8))).all()

@@ -6,7 +6,6 @@ import re
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.errors import MeshError
 from loops import for_each
 from meshes import box, flat_sheet, icosahedron, mesh_of, tetrahedron, write_obj
 
@@ -77,7 +76,9 @@ def test_polylines_of_an_obj_are_strokes_along_edges(tmp_path):
     instance = cf.read_mesh(path, boundary=False)
     assert strokes_of(instance) == pytest.approx({0: np.pi / 4, 1: np.pi / 4})
     write_square(path, "f -4 -3 -2", "f 3 4 1", "l 1 2 4")
-    with pytest.raises(MeshError, match=r"a.obj: a polyline goes from vertex 2 to vertex 4 \(from 1\)"):
+    with pytest.raises(
+        cf.InstanceError, match=r"a.obj: a polyline goes from vertex 2 to vertex 4 \(from 1\)"
+    ):
         cf.read_mesh(path)
 
 
@@ -331,7 +332,7 @@ def test_a_square_in_any_notation(name, data, note, tmp_path):
 def test_files_that_are_no_triangle_meshes_are_named(tmp_path, name, data, message):
     (tmp_path / name).write_bytes(data if isinstance(data, bytes) else data.encode())
     of_mesh = re.search("corners|none of|has no face|has more than|exist|coordinate|whole numbers", message)
-    with pytest.raises(MeshError if of_mesh else cf.InputError) as caught:
+    with pytest.raises(cf.InstanceError if of_mesh else cf.InputError) as caught:
         cf.read_mesh(tmp_path / name)
     assert str(caught.value).startswith(f"{tmp_path / name}: ")
     assert message in str(caught.value)
@@ -365,7 +366,7 @@ FAN = [f"f {k} {k % 4 + 1} 5" for k in range(1, 5)]
 )
 def test_meshes_that_are_no_manifolds_are_named_with_their_faces(tmp_path, faces, message):
     write_square(tmp_path / "a.obj", *faces)
-    with pytest.raises(MeshError) as caught:
+    with pytest.raises(cf.InstanceError) as caught:
         cf.read_mesh(tmp_path / "a.obj")
     assert message in str(caught.value)
 
@@ -423,7 +424,7 @@ def test_merging_stays_within_what_is_a_mesh(tmp_path):
         instance = cf.read_mesh(write_obj(path, both), merge=merge)
         assert (instance.mesh.parts, instance.reading.warnings) == (2, ())
     with pytest.raises(
-        MeshError, match=r"a.obj: has an edge of length 1 at its boundary; merge at a smaller"
+        cf.InstanceError, match=r"a.obj: has an edge of length 1 at its boundary; merge at a smaller"
     ):
         cf.read_mesh(write_obj(path, flat_sheet(3, 3)), merge=1.5)
     write_square(path, "v 0 0 0", "v 1 1 0", "f 1 2 3", "f 6 4 5", "l 5 3", "l 1 5")

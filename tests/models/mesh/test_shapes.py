@@ -5,7 +5,6 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.mesh.shapes import MESHES
 
 EULER = {
     "disc": 1, "star": 1, "plate": -1, "cube": 2, "bracket": 0, "stairs": 2, "pin": 2, "flange": 0, "gear": 2,
@@ -14,9 +13,9 @@ EULER = {
 FLAT = ("disc", "star", "plate")
 
 
-@pytest.mark.parametrize("name", MESHES)
+@pytest.mark.parametrize("name", EULER)
 def test_built_in_meshes_have_the_topology_of_their_shape(name):
-    mesh = MESHES[name][1]()
+    mesh = cf.sample(name).mesh
     mesh.check()
     assert mesh.euler_characteristic == EULER[name]
     # Gauss and Bonnet: the defects inside and the turns of the boundary make 2 pi for each unit of it.
@@ -28,15 +27,15 @@ def test_built_in_meshes_have_the_topology_of_their_shape(name):
 
 @pytest.mark.parametrize("name", FLAT)
 def test_flat_sheets_face_upwards(name):
-    assert (MESHES[name][1]().normals[:, 2] > 0).all()
+    assert (cf.sample(name).mesh.normals[:, 2] > 0).all()
 
 
-CLOSED = sorted(set(MESHES) - {*FLAT, "bump", "half_torus", "three_parts"})
+CLOSED = sorted(set(EULER) - {*FLAT, "bump", "half_torus", "three_parts"})
 
 
 @pytest.mark.parametrize("name", CLOSED)
 def test_closed_bodies_have_their_normals_outside(name):
-    mesh = MESHES[name][1]()
+    mesh = cf.sample(name).mesh
     first, second, third = (mesh.vertices[mesh.faces[:, corner]] for corner in range(3))
     assert (first * np.cross(second, third)).sum() / 6 > 0  # the volume
 

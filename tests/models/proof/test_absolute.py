@@ -5,7 +5,7 @@ import math
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.instance.angles import HALF
+from angles import HALF
 from crossfield.models.processes.compilation import crew
 from crossfield.models.proof.bound.dual import Dual
 from crossfield.models.proof.bound.lattice import Lattice

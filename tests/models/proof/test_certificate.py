@@ -15,9 +15,8 @@ import crossfield as cf
 import numpy as np
 import places
 import pytest
-from archives import forged, of_numpy
+from archives import forged, of_numpy, pack_arrays
 from certificate_arrays import allowed_of, with_allowed, with_head
-from crossfield.models.array_archive import pack_arrays
 from crossfield.models.field.jumps import free_jumps
 from crossfield.models.processes.process_pool import parallel_map
 from crossfield.models.proof.checkers import check_certificate, check_orthogonal

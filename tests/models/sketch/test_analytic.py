@@ -3,7 +3,7 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.instance.angles import line_difference
+from angles import line_difference
 from crossfield.models.sketch.surfaces import SURFACES, _find_parameters, _frame_patch
 from loops import for_each
 

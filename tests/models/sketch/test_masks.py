@@ -1,15 +1,15 @@
 """Masks: what `--mask` takes, and mask.png, the mask that was found, given back."""
 
+import re
+
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import invoke
-from crossfield.export.pictures.mask import write_mask
-from crossfield.models.sketch.samples import sample_svg
+from command_line import invoke
 from loops import for_each
 from PIL import Image, ImageDraw
 from scipy import ndimage
-from small_drawings import BLACK, svg
+from small_drawings import BLACK, sample_svg, svg
 
 LINE = f'<path d="M10 10 L90 90" {BLACK}/>'
 OPEN = svg(f'<path d="M84 30H10V70H90V30M50 30V70" {BLACK}/>')
@@ -109,7 +109,8 @@ def test_a_mask_given_back_unchanged_solves_the_same_up_to_the_border(name, size
     if name != "bitmap":
         path.write_text(sample_svg(name))
     first = cf.read_sketch(path, size=size)
-    mask = write_mask(first, tmp_path / "mask.png")
+    mask = tmp_path / "mask.png"
+    assert invoke(["instance", str(path), "--size", str(size), "-o", str(mask)]) == 0
     again = cf.read_sketch(path, size=size, mask=mask)
     assert max(again.mask.shape) == size
     assert_same_up_to_the_border(first, again)
@@ -119,11 +120,11 @@ def test_a_mask_given_back_unchanged_solves_the_same_up_to_the_border(name, size
         assert instance.mask.sum() * instance.pixel_size**2 == pytest.approx(white, rel=0.06)
 
 
-def test_an_instance_that_was_read_from_no_page_has_no_mask_file(tmp_path):
+def test_an_instance_that_was_read_from_no_page_has_no_mask_file(tmp_path, capsys):
     (tmp_path / "a.svg").write_bytes(OPEN.replace(b' viewBox="0 0 100 100"', b""))
-    for instance in (cf.sample("wave_sheet", 12), cf.read_sketch(tmp_path / "a.svg", size=12)):
-        with pytest.raises(cf.InputError, match=r"m\.png: .* has no page that a mask could cover"):
-            write_mask(instance, tmp_path / "m.png")
+    for source in ("wave_sheet", str(tmp_path / "a.svg")):
+        assert invoke(["instance", source, "--size", "12", "-o", str(tmp_path / "m.png")]) == 1
+        assert re.search(r"m\.png: .* has no page that a mask could cover", capsys.readouterr().err)
     assert not (tmp_path / "m.png").exists()
 
 
@@ -135,7 +136,6 @@ def test_warnings_reach_standard_error_and_are_no_part_of_the_instance(tmp_path,
     for output in ("a.json", "mask.png"):
         assert invoke(["instance", str(drawing), "-o", str(tmp_path / output), "--size", "48"]) == 0
         assert capsys.readouterr().err == f"crossfield: warning: open.svg: {warning}\n"
-    assert (tmp_path / "mask.png").read_bytes() == write_mask(instance, tmp_path / "m.png").read_bytes()
     again = cf.read_instance(tmp_path / "a.json")
     assert again.sha256 == instance.sha256
     assert again.reading is None

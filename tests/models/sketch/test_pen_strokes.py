@@ -143,7 +143,7 @@ def test_a_mesh_is_no_drawing_in_space_and_too_many_lines_are_refused_before_the
         read(b"v 2\n" + b"\n" * (input_limits.MAX_LINES + 1), source="a.curves")
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(
     st.lists(st.lists(st.tuples(*[st.floats(-1e9, 1e9)] * 3), min_size=2, max_size=4), min_size=1, max_size=3)
 )

@@ -6,10 +6,9 @@ import crossfield as cf
 import pytest
 from crossfield.models.sketch import publication
 from crossfield.models.sketch.publication import publishable_sketch
-from crossfield.models.sketch.samples import sample_svg
 from loops import for_each
 from PIL import Image
-from small_drawings import png, read
+from small_drawings import png, read, sample_svg
 
 TURNED = b"""<svg xmlns="http://www.w3.org/2000/svg" width="90mm" height="60mm">
 <g transform="rotate(7) scale(1.1 0.9)"><path d="M10 10h70v40q-9 9 -35 3T10 50z m5 5l9 9c1 2 3 4 5 6l7 0"/>

@@ -1,13 +1,12 @@
 """Random instances: the same for the same values, as asked, and equal to those of the library that ships."""
 
 import json
-from pathlib import Path
 
 import crossfield as cf
-from crossfield.export.library.plan import spec
 from loops import for_each
+from places import ROOT
 
-POINTS = Path(spec.__file__).parent / "known" / "points"
+POINTS = ROOT / "export/library/plan/known" / "points"
 PAPER = {"stroke_weight": 24 / 24, "skew_weight": 1e-6}
 
 

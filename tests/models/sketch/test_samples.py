@@ -2,15 +2,15 @@
 
 import crossfield as cf
 import numpy as np
-from crossfield.models.instance.angles import line_difference
-from crossfield.models.sketch.samples import SAMPLES
+from angles import line_difference
+from command_line import listed
 from loops import for_each
 from scipy import ndimage
 
-SKETCHES = [name for name, known in SAMPLES.items() if known.kind == "sketch"]
+SAMPLES = [(row["name"], row["kind"]) for row in listed()["samples"] if row["kind"] != "mesh"]
 
 
-@for_each("name, size", [(name, 24 if name in SKETCHES else 8) for name in SAMPLES])
+@for_each("name, size", [(name, 24 if kind == "sketch" else 8) for name, kind in SAMPLES])
 def test_every_sample_is_one_connected_region_with_enough_strokes_and_no_warning(name, size):
     instance = cf.sample(name, size)
     assert max(instance.mask.shape) == size

@@ -5,8 +5,8 @@ from functools import cache
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import invoke
-from crossfield.models.instance.angles import line_difference
+from angles import line_difference
+from command_line import invoke
 from loops import for_each
 from PIL import Image, ImageDraw
 from small_drawings import BLACK, png, read, svg

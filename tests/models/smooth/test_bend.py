@@ -6,7 +6,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.instance.angles import HALF
+from angles import HALF
 from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, tremble
 from crossfield.models.smooth.polyvector import HOLDS
 from exhaustive import sketch

@@ -3,12 +3,13 @@
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.instance.angles import line_difference
-from crossfield.models.smooth.polyvector import HOLDS
+from angles import line_difference
 from exhaustive import sketch
 from instance_kinds import grid
 from loops import for_each
 from moves import lines
+
+HOLDS = (0.1, 1.0, 100.0)
 
 
 @for_each("degrees", [10, 35, 60, 90])
