@@ -142,10 +142,11 @@ def test_a_file_that_came_during_the_work_is_not_replaced(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
-def test_ctrl_c_at_any_moment_leaves_all_earlier_files_or_all_new_ones(tmp_path):
+@pytest.mark.parametrize("step", [11, pytest.param(3, marks=pytest.mark.slow)])
+def test_ctrl_c_at_any_moment_leaves_all_earlier_files_or_all_new_ones(step, tmp_path):
     earlier, later = {"a": b"1", "gone": b"1"}, {"a": b"2", "come": b"2"}
     planned, ends = [*earlier, *later], set()
-    for number in count(1, 3):
+    for number in count(1, step):
         write_results(tmp_path, earlier, planned)
         sys.setprofile(interrupt_call(number))
         try:

@@ -34,7 +34,11 @@ def test_an_answer_of_the_ampl_model_is_read_back(tmp_path):
 
 @pytest.mark.needs("baron")
 @pytest.mark.parametrize(
-    "formulation, width", [("minlp-quartic", 2), ("miqcp-bilinear", 2), ("milp-mccormick", 1)]
+    "formulation, width",
+    [
+        pytest.param("minlp-quartic", 2, marks=pytest.mark.slow),
+        *[("miqcp-bilinear", 2), ("milp-mccormick", 1)],
+    ],
 )
 def test_baron_solves_its_file_to_the_optimum(formulation, width, tmp_path):
     """Its free edition takes 10 columns and 10 rows: two pixels at most."""

@@ -123,7 +123,7 @@ def test_huge_announced_counts_take_no_memory():
     assert peak < 1 << 20
 
 
-@settings(max_examples=20)
+@settings(max_examples=8)
 @given(
     values=st.lists(st.floats(allow_nan=False, allow_infinity=False), min_size=1),
     message=st.text(max_size=60).map("Solver: {}".format),

@@ -51,6 +51,7 @@ def skew():
     return cf.formulate(start.instance, "milp-mccormick"), start
 
 
+@pytest.mark.slow
 def test_a_complete_answer_of_a_killed_solver_counts(tmp_path, skew):
     """The file of HiGHS states an optimum, within the gap that it was given."""
     problem, _ = skew

@@ -11,8 +11,9 @@ from dataclasses import replace
 
 import crossfield as cf
 import pytest
+from cases import make_instance
 from children import complaints
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.solving.local import choose_solver
 from crossfield.export.statuses import Status
 from crossfield.models.formulations.catalogue import FORMULATIONS
@@ -182,6 +183,22 @@ def test_highs_takes_the_start_as_incumbent_and_a_wide_gap_ends_its_search(tmp_p
     assert (solution.claimed, solution.status) == (Status.OPTIMAL_IN_GAP, Status.LIMIT_WITH_POINT)
     assert solution.bound < 0.9 * solution.objective
     assert solution.objective - solution.bound <= 0.97 * solution.objective + 1e-9
+
+
+@pytest.mark.oracles
+def test_a_solver_that_is_given_the_optimum_has_no_worse_point():
+    best = cf.prove(make_instance("full", skew_coefficient=1.0), norm=1, jobs=1).field
+    # any point closes a relative gap of 1
+    problem = cf.formulate(best.instance, "milp-mccormick")
+    optimum = problem.objective_value(problem.point(best))
+    for solver in ("highs", "gurobi", "cplex", "xpress", "scip"):
+        try:
+            solution = cf.solve(problem, solver, limits=cf.Limits(20.0, 1.0, 1), start=best)
+        except cf.MissingSolverError:
+            continue
+        assert solution.objective == pytest.approx(optimum, abs=1e-6), solver
+        assert solution.nodes >= 0
+        assert solution.seconds > 0
 
 
 def test_only_a_search_and_a_proof_go_without_a_time_limit(tmp_path):

@@ -10,7 +10,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from cases import SKEWED, make_field
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.export.formats.registry import FORMATS, problem_in_format
 from crossfield.export.solutions.solution import Solution
 from crossfield.export.solvers_table import PROGRAMS, SOLVERS, suitability
@@ -44,10 +44,6 @@ def on_grid(height, width, name="small", seed=4):
     )
 
 
-PROVEN = ("miqcp-bilinear-l1", "miqp-mccormick", "milp-mccormick", "qp-fixed", "miqp-exact")
-"""Formulations that every solver that takes them proves at once."""
-
-
 @pytest.fixture(scope="session")
 def verified(tmp_path_factory):
     """The verification of all files of three pixels, solves included, whole and relaxed."""
@@ -59,16 +55,6 @@ def verified(tmp_path_factory):
         done[kind] = verify(folder, seconds=SECONDS)
         assert done[kind].failed_checks == []
     return done
-
-
-@pytest.mark.slow
-def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path):
-    """No time limit comes near: convex problems, or linear ones with products of binaries, of two pixels."""
-    cf.write_all(on_grid(1, 2), tmp_path, formulations=PROVEN, start=make_field(on_grid(1, 2)))
-    solves = [f for f in verify(tmp_path, seconds=250).checks if f.step == "solve"]
-    assert {f.verdict for f in solves} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
-    present = {name for name, solver in SOLVERS.items() if not solver.missing}
-    assert {f.program for f in solves if f.verdict == Verdict.AGREES} == present
 
 
 def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path):
@@ -202,14 +188,6 @@ def test_the_command_reports_what_differs(tmp_path, capsys):
     assert words in capsys.readouterr().err
     assert invoke(["verify", str(tmp_path), "-p", "nobody"]) == 1
     assert invoke(["verify", str(tmp_path / "absent")]) == 1
-
-
-@needing("xpress")
-def test_an_answer_of_xpress_that_was_cut_short_has_all_columns(tmp_path):
-    problem = cf.formulate(cf.sample("skew", 5), "minlp-quartic")
-    with Solvers() as solvers:
-        solution = solvers.solve(problem, "xpress", folder=tmp_path, limits=cf.Limits(1.0, threads=1))
-    assert solution.point is None or len(solution.point) == solution.problem.n_columns
 
 
 # the table of capabilities is true

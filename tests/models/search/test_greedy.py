@@ -7,7 +7,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.instance.angles import QUARTER
+from angles import QUARTER
 from crossfield.models.search.box_qp import fit_in_box
 from crossfield.models.search.nearest_stroke import nearest_strokes
 from crossfield.models.search.starts import first_field

@@ -58,20 +58,13 @@ def weighted(instance, factor):
     )
 
 
-@pytest.mark.parametrize("size, rounds", [(7, 1), (60, 0)])
+@pytest.mark.parametrize("size, rounds", [(7, 1), pytest.param(60, 0, marks=pytest.mark.slow)])
 def test_a_factor_of_all_weights_is_one_of_the_energy(size, rounds):
     instance = cf.sample("saddle", size)
     plain, scaled = (
         cf.search(each, rounds=rounds, jobs=1).field for each in (instance, weighted(instance, 4.0))
     )
     assert scaled.energy().total == pytest.approx(4 * plain.energy().total, rel=1e-6)
-
-
-def test_files_of_fixed_jumps_are_written_for_a_large_grid_with_weights(tmp_path):
-    instance = weighted(cf.sample("saddle", 60), 0.3)
-    assert instance.grid.size > 1024
-    cf.write_all(instance, tmp_path, formulations=["qp-fixed"], formats=["lp"])
-    assert list(tmp_path.glob("*.lp"))
 
 
 @pytest.mark.parametrize("gauge", ["strokes", "box"])

@@ -45,9 +45,16 @@ def options_of(drawing):
     return {key: drawing[key] for key in ("size", "curvature") if key in drawing}
 
 
-@pytest.mark.parametrize(
-    "drawing", TABLE["drawing"], ids=lambda drawing: f"{drawing['file']}-{drawing.get('size', 24)}"
-)
+DRAWINGS = [
+    pytest.param(
+        drawing, id=f"{drawing['file']}-{drawing.get('size', 24)}", marks=pytest.mark.slow if at % 3 else ()
+    )
+    for at, drawing in enumerate(TABLE["drawing"])
+]
+"""One of each three is quick, in table order: some of every kind."""
+
+
+@pytest.mark.parametrize("drawing", DRAWINGS)
 def test_a_drawing_is_read_as_it_looks(drawing):
     path = FOLDER / drawing["file"]
     if "error" in drawing:

@@ -22,11 +22,14 @@ from small_drawings import png, read
 BLUEPRINT = {"paper": "blue", "ink": WHITE}
 
 
-@for_each(
+ON_WOOD = "mouse", "wood", BLUEPRINT, {"turn": -20, "pitch": 20, "yaw": 18, "light": "shadow"}
+
+
+@pytest.mark.parametrize(
     "sample, table, ink, view",
     [
         ("bottle", "mat", {}, {"turn": 12, "pitch": -30, "light": "lamp"}),
-        ("mouse", "wood", BLUEPRINT, {"turn": -20, "pitch": 20, "yaw": 18, "light": "shadow"}),
+        pytest.param(*ON_WOOD, marks=pytest.mark.slow),
     ],
 )
 def test_a_sheet_on_a_table_is_straightened(sample, table, ink, view):
@@ -47,11 +50,11 @@ def test_a_sheet_that_the_picture_cuts_off_loses_its_surroundings():
     assert instance.reading.page == (0, 0, 1000, 750)
 
 
-@for_each(
+@pytest.mark.parametrize(
     "paper, ink, red",
     [
         ("black", WHITE, (220, 70, 60)),  # chalk and red chalk
-        ("kraft", BLACK, WHITE),
+        pytest.param("kraft", BLACK, WHITE, marks=pytest.mark.slow),
     ],
 )
 def test_strokes_are_lighter_or_darker_than_their_paper(paper, ink, red):
@@ -62,7 +65,9 @@ def test_strokes_are_lighter_or_darker_than_their_paper(paper, ink, red):
     assert_same_drawing(instance, read_clean("bottle", one_colour=red == WHITE))
 
 
-@for_each("widths, quality", [((30, 2), 60), ((1.5, 1.5), 75)])
+@pytest.mark.parametrize(
+    "widths, quality", [((30, 2), 60), pytest.param((1.5, 1.5), 75, marks=pytest.mark.slow)]
+)
 def test_thin_red_strokes_count_by_their_length(widths, quality):
     data = encode(draw_sheet("bottle", widths=widths), quality=quality)
     assert_same_drawing(read(data, 40, "a.jpg"), read_clean("bottle", widths=widths))

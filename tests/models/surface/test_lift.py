@@ -7,7 +7,6 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
-from crossfield.models.smooth.bend import surface_field
 from loops import for_each
 from moves import MOVES, lines
 from places import ROOT
@@ -15,11 +14,22 @@ from places import ROOT
 KNOWN = ROOT.parent / "shared" / "known_surfaces"
 
 
+def surface_field(instance):
+    return cf.bend_field(cf.polyvector_field(instance, hold=100))
+
+
 @functools.cache
 def exact(name, size):
     """An analytic instance, and the field of its exact crosses."""
     true = cf.analytic(name, size)
     return true, cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle)
+
+
+@functools.cache
+def spheroid():
+    """The exact spheroid on 12 pixels, its field, and the surface over this."""
+    true, field = exact("spheroid", 12)
+    return true, field, cf.surface(field)
 
 
 def apart(first, second):
@@ -51,15 +61,17 @@ def test_a_hint_chooses_among_surfaces_of_the_same_crosses():
     assert settled.freedom == ()
 
 
-@for_each("name", ["tilted_cylinder", "cone", "spheroid", "saddle"])
+SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("tilted_cylinder", "saddle")]
+
+
+@pytest.mark.parametrize("name", ["cone", "spheroid", *SLOW])
 def test_depth_is_open_where_rulings_are_straight(name):
     kinds = [choice.kind for choice in cf.surface(surface_field(cf.sample(name, 24))).freedom]
     assert ("depth" in kinds) == (name in {"tilted_cylinder", "cone"})
 
 
 def test_a_part_is_made_concave_at_a_place():
-    _, field = exact("spheroid", 12)
-    plain = cf.surface(field)
+    _, field, plain = spheroid()
     (side,) = plain.freedom
     for flip in (False, True):
         bowl = cf.surface(field, flip=flip, concave=[side.place])
@@ -70,10 +82,10 @@ def test_a_part_is_made_concave_at_a_place():
 
 
 def test_a_hint_and_flip_choose_the_side():
-    true, field = exact("spheroid", 12)
+    true, field, plain = spheroid()
     hint = middle(true)
     other = replace(hint, tilt=hint.tilt + np.pi)
-    plain, turned = cf.surface(field), cf.surface(field, flip=True)
+    turned = cf.surface(field, flip=True)
     assert turned.heights == pytest.approx(-plain.heights, nan_ok=True)
     assert turned.normals == pytest.approx(plain.flipped().normals)
     flipped = [cf.surface(field, [one], flip=True) for one in (hint, other)]
@@ -84,21 +96,21 @@ def test_a_hint_and_flip_choose_the_side():
 
 def test_how_crosses_are_written_does_not_matter():
     """Lines exchanged, turned by pi, and other jumps, at random at each pixel."""
-    _, field = exact("spheroid", 12)
+    _, field, plain = spheroid()
     steps = np.random.default_rng(0).integers(-3, 4, field.instance.grid.size)
     alpha, beta = field.alpha + np.pi / 2 * steps, (-1.0) ** steps * field.beta
     other = cf.CrossField(field.instance, alpha, beta, np.zeros_like(field.p))
-    assert cf.surface(other).heights == pytest.approx(cf.surface(field).heights, abs=1e-6, nan_ok=True)
+    assert cf.surface(other).heights == pytest.approx(plain.heights, abs=1e-6, nan_ok=True)
 
 
 @for_each("moved_instance", MOVES)
 def test_the_surface_moves_with_the_sketch(moved_instance):
     move, turn = MOVES[moved_instance]
-    _, field = exact("spheroid", 12)
+    _, field, plain = spheroid()
     other = moved_instance(field.instance)
     there = [turn(move(field.image(line)))[other.mask] for line in lines(field)]
     moved = cf.surface(cf.CrossField.from_lines(other, *there)).heights
-    assert moved == pytest.approx(move(cf.surface(field).heights), abs=0.05, nan_ok=True)
+    assert moved == pytest.approx(move(plain.heights), abs=0.05, nan_ok=True)
 
 
 def on_mask(name, mask, u, v):
@@ -106,7 +118,10 @@ def on_mask(name, mask, u, v):
     return cf.CrossField.from_lines(instance, u, v)
 
 
-@for_each("mask", [np.ones((1, 1)), np.ones((1, 4)), np.eye(3), np.indices((3, 4)).sum(axis=0) % 2])
+CHECKERED = pytest.param(np.indices((3, 4)).sum(axis=0) % 2, marks=pytest.mark.slow)
+
+
+@pytest.mark.parametrize("mask", [np.ones((1, 1)), np.ones((1, 4)), np.eye(2), CHECKERED])
 def test_any_mask_has_heights_at_the_corners_of_its_pixels(mask):
     mask = np.array(mask, dtype=bool)
     lifted = cf.surface(on_mask("tiny", mask, np.full(mask.sum(), 0.3), np.full(mask.sum(), 1.3)))
@@ -119,14 +134,14 @@ def test_any_mask_has_heights_at_the_corners_of_its_pixels(mask):
 
 
 def test_parts_of_the_mask_are_independent():
-    true, field = exact("spheroid", 12)
+    true, field, plain = spheroid()
     gap = np.zeros((true.instance.mask.shape[0], 1), dtype=bool)
     mask = np.hstack([true.instance.mask, gap, true.instance.mask[:, ::-1]])
     pictures = [field.image(line) for line in lines(field)]
     mirrored = [np.pi - picture[:, ::-1] for picture in pictures]
     twice = [np.hstack([one, gap, other])[mask] for one, other in zip(pictures, mirrored, strict=True)]
     both = cf.surface(on_mask("twice", mask, *twice)).heights
-    alone = cf.surface(field).heights
+    alone = plain.heights
     wide = alone.shape[1]
     assert both[:, :wide] == pytest.approx(alone, abs=1e-6, nan_ok=True)
     assert both[:, wide:] == pytest.approx(alone[:, ::-1], abs=0.05, nan_ok=True)
@@ -151,6 +166,7 @@ def test_samples_are_trusted_but_not_at_singular_spots(name):
     assert (lifted.confidence[at] == 0).all()
 
 
+@pytest.mark.slow
 def test_crosses_of_no_surface_are_doubted():
     instance = cf.sample("mouse", 9)
     angle = np.random.default_rng(0).uniform(0, np.pi, (2, instance.grid.size))
@@ -158,14 +174,6 @@ def test_crosses_of_no_surface_are_doubted():
     (unfit,) = (doubt for doubt in lifted.doubts if "no one surface" in doubt)
     assert 0 < unfit.index("missing") < unfit.index("not curvature lines") < unfit.index("hidden")
     assert lifted.confidence.mean() < 0.7
-
-
-@pytest.mark.skipif(not KNOWN.is_dir(), reason="needs the drawings in ../shared/known_surfaces")
-def test_the_lowest_of_the_starts_is_found_on_a_drawing():
-    """Where the systems of the coarsest level are not solved exactly, a start of less energy is missed."""
-    surface = cf.surface(surface_field(cf.read_sketch(KNOWN / "wave.clean.svg", size=48)))
-    assert not surface.doubts
-    assert np.ptp(surface.heights[np.isfinite(surface.heights)]) > 30
 
 
 @pytest.mark.slow
