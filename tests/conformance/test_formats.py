@@ -65,6 +65,8 @@ def is_taken(instance, formulation, change="", limits=False, **_):
     is_cycle, is_fixed = "-cycle" in formulation, bool(FORMULATIONS[formulation].fixed)
     if (change == "jumps fixed" and is_fixed) or (change == "windows narrowed" and is_cycle):
         return False
+    if instance.indices is not None and (limits or not is_cycle):
+        return False
     is_right = FORMULATIONS[formulation].orthogonal
     return (instance.orthogonal or not is_right) and not ((is_cycle or limits) and instance.gauge == "box")
 
