@@ -118,6 +118,13 @@ def test_a_search_begins_far_below_the_improved_greedy_field():
     assert first < 0.9 * cf.improved_field(cf.greedy_field(instance)).energy().total
 
 
+def test_searches_and_proofs_begin_at_most_at_the_field_of_the_polyvector():
+    instance = cf.sample("mouse", 16)
+    polyvector = cf.improved_field(cf.polyvector_field(instance)).energy().total
+    assert cf.search(instance, rounds=0, jobs=1).field.energy().total <= polyvector + 1e-9
+    assert cf.prove(instance, work=10, jobs=1).energy <= polyvector + 1e-9
+
+
 CHILD = """
 import crossfield as cf
 if True:
