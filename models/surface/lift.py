@@ -118,15 +118,17 @@ def _solve_part(
 
     All starts are solved on the coarsest level, and the lowest one on all finer ones.
     """
-    coarse, *finer = levels_of(part)
-    dome, *planes = ([*_from_start(coarse, z, hints, is_over, flip=flip)] for z in coarse.initial_heights)
+    coarsest, *finer = levels_of(part)
+    dome, *planes = ([*_from_start(coarsest, z, hints, is_over, flip=flip)] for z in coarsest.initial_heights)
     candidates = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
-    _, z = min(candidates, key=itemgetter(0))
-    another = find_open_depth(coarse, z, [hint_rows(hint, coarse) for hint in hints])
+    _, lowest = min(candidates, key=itemgetter(0))
+    z, coarse = lowest, coarsest
     for level in finer:
         z = _descend_with_hints(level, level.interpolate(coarse, z), hints, is_over)[1]
         coarse = level
-    return z if hints else _orient(part, z, flip=flip), another
+    oriented = z if hints else _orient(part, z, flip=flip)
+    sided = lowest if oriented is z else -lowest  # else its hint would belong to the other side
+    return oriented, find_open_depth(coarsest, sided, [hint_rows(hint, coarsest) for hint in hints])
 
 
 def _from_start(

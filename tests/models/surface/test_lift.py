@@ -20,7 +20,6 @@ def surface_field(instance):
 
 @functools.cache
 def exact(name, size):
-    """An analytic instance, and the field of its exact crosses."""
     true = cf.analytic(name, size)
     return true, cf.CrossField.from_lines(true.instance, true.u_angle, true.v_angle)
 
@@ -33,12 +32,10 @@ def spheroid():
 
 
 def apart(first, second):
-    """Angles in degrees between unit normals."""
-    return np.degrees(np.arccos(np.clip((first * second).sum(axis=1), -1, 1)))
+    return np.degrees(np.arccos(np.clip((first * second).sum(axis=1), -1, 1)))  # of unit normals
 
 
 def middle(true):
-    """The hint of the pixel next to the middle of the mask."""
     pixels = np.argwhere(true.instance.mask)
     at = np.argmin(((pixels - pixels.mean(axis=0)) ** 2).sum(axis=1))
     x, y, z = true.normals[at]
@@ -59,6 +56,10 @@ def test_a_hint_chooses_among_surfaces_of_the_same_crosses():
     assert apart(settled.normals, true.normals).mean() < 2
     assert [choice.kind for choice in loose.freedom] == ["side", "depth"]
     assert settled.freedom == ()
+    mask = true.instance.mask & (np.arange(16) >= 5)
+    late = cf.surface(on_mask("late", mask, *(line[mask[true.instance.mask]] for line in lines(field))))
+    hint = late.freedom[-1].hint
+    assert hint.slopes @ late.gradient[late.instance.grid.number[hint.row, hint.column]] > 0
 
 
 SLOW = [pytest.param(name, marks=pytest.mark.slow) for name in ("tilted_cylinder", "saddle")]
@@ -171,8 +172,7 @@ def test_crosses_of_no_surface_are_doubted():
     instance = cf.sample("mouse", 9)
     angle = np.random.default_rng(0).uniform(0, np.pi, (2, instance.grid.size))
     lifted = cf.surface(cf.CrossField.from_lines(instance, *angle))
-    (unfit,) = (doubt for doubt in lifted.doubts if "no one surface" in doubt)
-    assert 0 < unfit.index("missing") < unfit.index("not curvature lines") < unfit.index("hidden")
+    assert any("no one surface" in doubt for doubt in lifted.doubts)
     assert lifted.confidence.mean() < 0.7
 
 
