@@ -86,6 +86,7 @@ _FAR: Final = 1000.0  # sides of the page: coordinates beyond it are too large f
 _FINEST: Final = 1e-5  # of the page: least width of a stroke that is seen
 _FAINT: Final = 0.24  # of the strength of others: less than half as dark, or a quarter as wide
 _STRONG: Final = 0.1  # of the length of lines: part that is stronger than what others are compared with
+_CORNER: Final = 0.02  # of the sides of the box of other lines: distance from a corner of it
 _MOST_STOPS: Final = 100  # stops of a gradient that count
 _MOST_BODIES: Final = 1000  # larger areas with which an area is compared
 
@@ -147,10 +148,11 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     if pens:
         strokes = [shape for shape in painted if shape.element in pens or shape.is_stroked]
         ground = np.array(opaque_colour(background or choose_paper(strokes)))
+        difference = np.abs(picture_of(framed) / 255 - ground).max(axis=2)
         _paint_strokes(
             painted, _plain_colours(root, walk.styles, painted), pens, page, matcher, ground=ground
         )
-        curves = _trace_strokes(framed, page, window, unread, has_choice=matcher is not None)
+        curves = _trace_strokes(framed, page, window, unread, difference, has_choice=matcher is not None)
     else:
         seen, notes = see_strokes(framed, window, shapes, background or choose_paper(shapes))
         curves = _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
@@ -263,9 +265,18 @@ def _mean_of_stops(
 
 
 def _trace_strokes(
-    root: Element, page: DrawingPage | None, window: Box, notes: tuple[str, ...], *, has_choice: bool
+    root: Element,
+    page: DrawingPage | None,
+    window: Box,
+    notes: tuple[str, ...],
+    difference: Floats,
+    *,
+    has_choice: bool,
 ) -> Curves:
-    """The middle lines of the strokes in the picture of a drawing with painted strokes."""
+    """The middle lines of the strokes in the picture of a drawing with painted strokes.
+
+    difference: of the picture's pixels [h, w] from their ground, before strokes were painted, in [0, 1].
+    """
     picture = picture_of(root)
     # Black, red and white, paler where a stroke or its layer is translucent.
     is_ink, is_red = picture[..., 1] < 255 * (1 - PAPER), picture[..., 0] > picture[..., 1]
@@ -274,11 +285,15 @@ def _trace_strokes(
         raise InputError("shows no stroke: its filled strokes are hidden")
     pixel = np.array(window[2:]) / picture.shape[1::-1]
     lines = [window[:2] + pixel * (smooth_way(way) + 0.5) for way, _ in ways]
-    count = [len(line) - 1 for line in lines]
-    points = np.concatenate([lines_as_cubics(line[:-1], line[1:]) for line in lines])
-    red = np.repeat([red for _, red in ways], count)
-    curve = np.repeat(np.arange(len(ways), dtype=np.int32), count)
-    return Curves(points, curve, red, page.box if page else None, red if has_choice else None, notes)
+    cubics = [lines_as_cubics(line[:-1], line[1:]) for line in lines]
+    number = np.repeat(np.arange(len(ways), dtype=np.int32), [len(part) for part in cubics])
+    strength = [float(np.median(difference[tuple(way.T)])) ** 2 for way, _ in ways]
+    seen = [Seen(part, (0.0, 0.0, 0.0), each) for part, each in zip(cubics, strength, strict=True)]
+    red = np.array([is_line for _, is_line in ways], dtype=bool)
+    chosen = red[number] if has_choice else None
+    faint = _find_faint(seen, red) & ~(has_choice & red)
+    box = page.box if page else None
+    return Curves(np.concatenate(cubics), number, red[number], box, chosen, notes, faint[number])
 
 
 def _leave_out_areas(
@@ -371,7 +386,7 @@ def _find_faint(seen: Sequence[Seen], is_line: Bools) -> Bools:
     """Which lines are much paler or thinner than the others of their kind; straight ones, than all others.
 
     Where all strokes are curvature lines, pale ones may be sections of the object. Only straight ones that
-    begin and end outside of the others are surely construction lines.
+    begin and end outside of the others, or in corners of their box, are surely construction lines.
     """
     strength = np.array([part.strength for part in seen])
     ends = np.array([part.points[[0, -1], [0, 3]] if len(part.points) else np.zeros((2, 2)) for part in seen])
@@ -391,8 +406,11 @@ def _find_faint(seen: Sequence[Seen], is_line: Bools) -> Bools:
     corners = np.concatenate(
         [part.points.reshape(-1, 2) for part, faint in zip(seen, weak, strict=True) if not faint]
     )
-    is_outside = ((ends < corners.min(axis=0)) | (ends > corners.max(axis=0))).any(axis=2).all(axis=1)
-    return weak & is_straight & is_outside
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    room = _CORNER * (high - low)
+    is_corner = ((ends < low + room) | (ends > high - room)).all(axis=2)
+    is_outside = ((ends < low) | (ends > high)).any(axis=2) | is_corner
+    return np.asarray(weak & is_straight & is_outside.all(axis=1))
 
 
 def _list_unread(
