@@ -112,6 +112,10 @@ def test_the_surface_moves_with_the_sketch(moved_instance):
     there = [turn(move(field.image(line)))[other.mask] for line in lines(field)]
     moved = cf.surface(cf.CrossField.from_lines(other, *there)).heights
     assert moved == pytest.approx(move(plain.heights), abs=0.05, nan_ok=True)
+    bent = surface_field(cf.sample("mouse", 96))  # large enough for conjugate gradients on two levels
+    other = surface_field(moved_instance(bent.instance))
+    there = [turn(move(bent.image(line)))[other.instance.mask] for line in lines(bent)]
+    assert other.cross_error(*there).max() < 1e-6
 
 
 def on_mask(name, mask, u, v):
