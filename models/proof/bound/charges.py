@@ -46,6 +46,7 @@ _OVER: Final = 1.5  # relaxation
 _STILL: Final = 1e-7  # excess of sand, in particles, that topples no more
 _LEAST: Final = 1e-5  # background below which sand is not spread thinner
 _ROUNDING: Final = 1e-12  # relative: of the charges of a cloud, far above what a checker deducts
+_NEAR: Final = 0.1  # of what joins a loop to others: how fast charges count less with distance
 _DIGITS: Final = 9  # of charges: those that symmetry makes equal are, however a mesh is numbered
 _ROUNDS: Final = 12  # of a stage
 _STEPS: Final = 300  # of gradients for a potential
@@ -99,7 +100,10 @@ def _ring_loops(domain: Domain, rows: CentredRows) -> Arrays:
 
 
 class _Stages:
-    """Stages of charges. part (l,): of each loop; whole: whether charges of a part add up to 0."""
+    """Stages of charges. part (l,): of each loop; whole: whether charges of a part add up to 0.
+
+    nearby (l,): means of charges round each loop.
+    """
 
     def __init__(self, charges: Charges) -> None:
         line = np.repeat(np.arange(charges.size), np.diff(charges.begin))
@@ -109,6 +113,8 @@ class _Stages:
         self.whole = np.bincount(self.part, ~charges.closed, count) == 0
         self.charges, self.laplacian = charges, (diags_array(charges.resistance) - near).tocsr()
         self.inverse = factor_matrix(self.laplacian, pull=1e-9 * float(charges.resistance.max()))
+        pull = _NEAR * float(charges.resistance.mean())
+        self.nearby = (pull * factor_matrix(self.laplacian, pull=pull)(charges.origin)).round(_DIGITS)
 
     def stage(
         self, most: Indices, threshold: float, is_over: IsOver, rounds: int
@@ -147,17 +153,14 @@ class _Stages:
     def _places(self, most: Indices) -> tuple[Bools, Bools]:
         """Where clouds of a sign may lie, and loops whose own particle may have one: (2, l) each.
 
-        Clouds of both signs stay apart: where they would meet, loops of charges nearer 0 have none.
+        Clouds of both signs stay apart: each loop has those of the sign of most charges near it.
         """
-        origin, (first, second) = self.charges.origin.round(_DIGITS), self.charges.links
-        positive = (most[1] == 0) & ((most[0] > 0) | (origin >= 0))
-        negative, both = (most[0] == 0) & ~positive, most.min(axis=0) > 0
-        home = np.array([positive | (both & (origin >= 0)), negative | (both & (origin < 0))])
-        meet = (home[0][first] & home[1][second]) | (home[1][first] & home[0][second])
-        strength = np.abs(origin) + 10.0**-_DIGITS * (origin < 0)  # in a tie, the negative one
-        weaker = np.where(strength[first] < strength[second], first, second)[meet]
-        home[:, weaker] = False
-        return np.array([positive, negative]) & home, home
+        first, second = self.charges.links
+        home = np.array([self.nearby >= 0, self.nearby < 0])
+        strength = np.abs(self.nearby) + 10.0**-_DIGITS * home[1]  # in a tie, the negative one
+        weaker = np.where(strength[first] < strength[second], first, second)
+        home[:, weaker[home[0][first] != home[0][second]]] = False
+        return home & (most[::-1] == 0), home
 
     def _spread(
         self, most: Indices, places: tuple[Bools, Bools], background: Floats, is_over: IsOver

@@ -40,6 +40,7 @@ MOST_RING = 64  # pairs of a ring
 MOST_TABLES = 1 << 22  # of a level: sums of so many 32-bit numbers are exact in 64-bit floats
 MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi/4
 COLUMNS = 64  # of an inverse, at once
+LONGEST_WALK, MOST_SWEEPS = 100, 20  # steps of a walk; turns of both signs
 MOST_STAGES = 64  # of charges
 LINKS_AT_ONCE = 1 << 19  # of links from their clouds at once
 MOST_CASES = 256  # of integers after the last level
@@ -84,7 +85,7 @@ class CentredRows:
     less than here, because kappa differs from that of the mesh. memory, taken: most bytes for the check, and
     those that it takes without levels.
 
-    Prescribed indices (Lemma 10) add `constant` to the energy, and shift residuals by shift (r,) on the rows
+    Prescribed indices (Lemma 11) add `constant` to the energy, and shift residuals by shift (r,) on the rows
     of their rings, where is_held (r,) is True. steps (3, t): ring, row and direction along these rings. turns
     (k,): the sums of integers there.
     """
@@ -128,7 +129,7 @@ class CentredRows:
         self.residual = self.residuals(self.centre) + HALF * self.nearest
 
     def _shift_residuals(self, arrays: dict[str, Array]) -> tuple[Array, Array, float]:
-        """Lemma 10: which rows are held, by how much residuals are shifted, and the constant."""
+        """Lemma 11: which rows are held, by how much residuals are shifted, and the constant."""
         (ring, row, sign), size, count = self.steps, len(self.turns), len(self.offset)
         held = np.bincount(row, minlength=count) > 0
         if size == 0:
@@ -687,6 +688,21 @@ class Charges:
         base.require(least < most + 0.5, "loops", "have a charge beyond the limits")
         nearest = least + np.clip(np.round(-least), 0, np.round(most - least))
         self.origin, self.most = -nearest, np.round([most - nearest, nearest - least]).astype(np.int64)
+        if len(rows.turns) == 0:
+            self._exclude_by_walks(reach + self.error)
+
+    def _exclude_by_walks(self, reach: Array) -> None:
+        """Exclude particles by Lemma 8. reach (l,): the greatest charges by Lemma 1."""
+        for _ in range(MOST_SWEEPS):
+            before = self.most.sum()
+            for side, sign in enumerate((1, -1)):
+                gain, ahead = 1 - sign * self.origin - reach, np.zeros(self.size)
+                for _ in range(LONGEST_WALK):
+                    worth = np.maximum(gain + ahead, 0.0) / self.resistance
+                    ahead = (1 - RELATIVE) * self.around(np.where(self.most[1 - side] == 0, worth, 0.0))
+                self.most[side] = np.minimum(self.most[side], np.floor(1 - gain - ahead).clip(0))
+            if self.most.sum() == before:
+                break
 
     def around(self, numbers: Array) -> Array:
         """Sums of numbers (l,) over the neighbours of all loops, with the entries of the Laplacian."""
@@ -695,7 +711,7 @@ class Charges:
 
 
 class Clouds:
-    """Particles and their clouds (Lemma 8).
+    """Particles and their clouds (Lemma 9).
 
     most (2, l): how many positive and negative particles each loop may have. loop, sign (p,): of each kind of
     particle, the positive ones first. owner, cell, weight (k,): the kind, loop and number of each entry of a
@@ -746,7 +762,7 @@ class Clouds:
 
 
 def stage_of(charges: Charges, clouds: Clouds, potential: Array, price: Array) -> tuple[float, Array, Array]:
-    """Lemma 9: a lower bound; what each particle adds to it, (c,), and the kind of that particle.
+    """Lemma 10: a lower bound; what each particle adds to it, (c,), and the kind of that particle.
 
     The c particles are those of the kinds one after the other, first, second and so on of each kind.
     """
