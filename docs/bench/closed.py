@@ -34,6 +34,10 @@ def surfaces() -> Iterator[tuple[str, cf.Mesh]]:
             yield "icosphere", sphere
     points = sphere.vertices
     yield "ellipsoid, axes 1, 0.7, 0.5", cf.Mesh(points * (1, 0.7, 0.5), sphere.faces)
+    waist = 1 - 0.6 * np.exp(-4 * points[:, 2:] ** 2)
+    yield "peanut", cf.Mesh(points * np.hstack([waist, waist, np.ones_like(waist)]), sphere.faces)
+    bumps = 1 + 0.2 * np.sin(4 * points).prod(axis=1, keepdims=True)
+    yield "sphere with bumps", cf.Mesh(points * bumps, sphere.faces)
     yield "rounded cube", cf.Mesh(points / np.linalg.norm(points, 6, 1, keepdims=True), sphere.faces)
     corner = np.arange(512).reshape(32, 16)
     across, up = np.roll(corner, -1, 0), np.roll(corner, -1, 1)
@@ -41,7 +45,11 @@ def surfaces() -> Iterator[tuple[str, cf.Mesh]]:
     alternating = torus(32, 16)
     yield "torus, parallel diagonals", cf.Mesh(alternating.vertices, squares.reshape(-1, 3))
     yield "torus, alternating diagonals", alternating
-    yield "hull of 350 random points", hull(np.random.default_rng(0).normal(size=(350, 3)))
+    rng = np.random.default_rng(0)
+    random = hull(rng.normal(size=(350, 3)))
+    yield "hull of 350 random points", random
+    radius = rng.uniform(0.9, 1.1, (350, 1))
+    yield "these points, at random distances", cf.Mesh(random.vertices * radius, random.faces)
 
 
 def main(page: Path, _: Sequence[str]) -> None:
