@@ -97,6 +97,10 @@ class Termination:
             return "work"
         return "time" if self.deadline.passed() else ""
 
+    def reason_at(self, energy: float, bound: float) -> str:
+        """As `reason`, with a sufficient gap. None is sufficient at a bound of 0, which proves nothing."""
+        return "gap" if energy - bound <= self.gap * energy and bound > 0 else self.reason()
+
     def is_over(self, ahead: float = 0.0) -> bool:
         """Whether work has to end now, or within `ahead` seconds."""
         return bool(self.reason()) or self.deadline.left() <= ahead
@@ -312,10 +316,8 @@ class Descent:
 
     def _reason_to_end(self) -> str:
         """The reason why the work ends; empty if it goes on."""
-        energy, bound = self.energy(self.best), self.proven.bound
-        if self._is_exact(bound):
-            return "optimal"
-        return "gap" if energy - bound <= self.ends.gap * energy else self.ends.reason()
+        bound = self.proven.bound
+        return "optimal" if self._is_exact(bound) else self.ends.reason_at(self.energy(self.best), bound)
 
     def _is_exact(self, bound: float) -> bool:
         energy = self.energy(self.best)

@@ -451,7 +451,7 @@ class _Prover:
         """The reason why the work ends; empty if it goes on."""
         if self.least - chain.bound <= OPTIMAL / 2 * max(1.0, self.least):
             return "optimal"
-        return "gap" if self.least - self.proven.bound <= self.ends.gap * self.least else self.ends.reason()
+        return self.ends.reason_at(self.least, self.proven.bound)
 
     def _more_rings(self, dual: RingDual, share: float) -> list[int]:
         """Rings with that share of what pairs cost at the centre beyond their shares, and not in use."""
