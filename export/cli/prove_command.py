@@ -123,8 +123,8 @@ def _write_proof(
 def _keep_better(new: NewResults, proof: Proof, names: ProofNames, bound: float | None) -> None:
     """Keep an earlier field of less energy, and an earlier certificate of a higher bound.
 
-    Its report stays with a certificate; without one, with the field. With an earlier certificate, a field of
-    the same energy stays, which is the one that it holds.
+    Its report stays with a certificate; without one, with the field. With an earlier certificate, an
+    earlier field of the same energy stays, too.
     """
     from ...models.proof.certificate import earlier_bound
     from ..bundle.earlier import keep_better_field

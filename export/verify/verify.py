@@ -106,7 +106,9 @@ def verify(
     with temporary_folder() as temporary:
         subjects, broken = _subjects(manifests, temporary)
         verification.checks.extend(broken)
-        for program in (program for program in wanted if program.name not in absent):
+        for program in wanted:
+            if program.missing:
+                continue
             chosen = [subject for subject in subjects if subject.format in program.formats]
             with Solvers() as solvers:
                 bench = _ProgramChecks(program, solvers, seconds)

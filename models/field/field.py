@@ -336,9 +336,9 @@ def _steps_into_windows(instance: Instance, alpha: Floats, beta: Floats, *, insi
 
 def _check_lines(instance: Instance, u_angle: Any, v_angle: Any) -> tuple[Floats, Floats]:
     """The angles of the two lines of each point, (n,) each. Raises InputError."""
-    u, v = float_array(u_angle, "u_angle"), float_array(v_angle, "v_angle")
+    u, v, size = float_array(u_angle, "u_angle"), float_array(v_angle, "v_angle"), instance.domain.size
     for name, angles in (("u_angle", u), ("v_angle", v)):
-        if angles.shape != (size := instance.domain.size,):
+        if angles.shape != (size,):
             raise InputError(
                 f"{name} has shape {angles.shape}, but {instance.name} has {size} pixels; "
                 "give an angle for each"

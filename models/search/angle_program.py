@@ -55,6 +55,7 @@ def solve_angle_program(
     """Angles x (2n,) that minimise the energy minus tilt x in a box, and multipliers (r,) of its residuals.
 
     Clarabel computes them; multipliers are 0 where weights are 0.
+
     p: jumps, shape (m,). lower, upper: the box of x = (alpha, beta) in radians, shapes (2n,). tilt: shape
     (2n,), None for zeros. lines, target: as of `residuals_at`. weight (r,): of the residuals, None for theirs
     in the energy. Raises CrossfieldError when Clarabel finds no solution; one always exists.

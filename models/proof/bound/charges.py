@@ -278,11 +278,11 @@ def _topple(
             size, moved = _sweep(laplacian, places, (place, local, numbers), size)
             if moved < _STILL:
                 break
-        for k in range(size):  # as in a certificate
+        for k in range(size):  # rounded as in a certificate
             numbers[0, k] = float(np.float32(numbers[0, k]))
-        kept = _is_cloud(laplacian, (place, local, numbers), size)
+        is_cloud = _is_cloud(laplacian, (place, local, numbers), size)
         for j in np.sort(local[:size]):
-            if kept and numbers[0, place[j]] > 0.0:
+            if is_cloud and numbers[0, place[j]] > 0.0:
                 cells[filled], weights[filled] = j, numbers[0, place[j]]
                 filled, count[a] = filled + 1, count[a] + 1
             place[j] = -1
