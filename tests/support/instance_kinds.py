@@ -161,10 +161,10 @@ def kind(name: str) -> cf.Instance:
 
 
 def first_field(instance: cf.Instance) -> cf.CrossField:
-    """A field with the indices that are prescribed, else the greedy one."""
-    return (
-        cf.greedy_field(instance) if instance.indices is None else cf.search(instance, rounds=0, jobs=1).field
-    )
+    """The greedy field, or where indices are prescribed, one that a search finds."""
+    if instance.indices is None:
+        return cf.greedy_field(instance)
+    return cf.search(instance, rounds=0, jobs=1).field
 
 
 MANY: Final = [name for name in KINDS if kind(name).domain.size > 400]

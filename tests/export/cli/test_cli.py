@@ -13,6 +13,11 @@ from answers import HIGHS_STATES_BOUNDS
 from cases import make_instance, write_point
 from children import complaints as without_progress
 from command_line import invoke
+from crossfield.export.formats.registry import FORMATS
+from crossfield.export.runs.methods import METHODS
+from crossfield.export.solvers_table import BUNDLED, SOLVERS
+from crossfield.models.formulations.catalogue import FORMULATIONS
+from crossfield.models.sketch.samples import SAMPLES
 from folders import contents
 from loops import for_each
 
@@ -226,18 +231,14 @@ def test_only_json_is_printed_on_standard_output(crossfield, instance_file):
 
 def test_list_shows_all_tables(crossfield):
     listed = json.loads(crossfield("list --json"))
-    assert [row["formulation"] for row in listed["solvers"]] == [
-        row["name"] for row in listed["formulations"]
-    ]
+    assert [row["name"] for row in listed["formulations"]] == list(FORMULATIONS)
+    assert [row["name"] for row in listed["formats"]] == list(FORMATS)
+    assert all(set(SOLVERS) < set(row) for row in listed["solvers"])
+    assert [row["name"] for row in listed["methods"]] == list(METHODS)
     text = crossfield("list")
     for word in " ".join(row["summary"] for row in listed["formulations"]).split():
         assert word in text.split()  # no word is broken
-    for name in (
-        "highs",
-        "ipopt",
-        "bonmin",
-        *(row["name"] for rows in listed.values() for row in rows if "name" in row),
-    ):
+    for name in (*SAMPLES, *FORMULATIONS, *FORMATS, *BUNDLED, *(row["name"] for row in listed["readers"])):
         assert name in text
 
 

@@ -32,14 +32,11 @@ def test_an_answer_of_the_ampl_model_is_read_back(tmp_path):
         assert solution.objective == pytest.approx(float(claim), abs=1e-9)
 
 
+QUARTIC = pytest.param("minlp-quartic", 2, marks=pytest.mark.slow)
+
+
 @pytest.mark.needs("baron")
-@pytest.mark.parametrize(
-    "formulation, width",
-    [
-        pytest.param("minlp-quartic", 2, marks=pytest.mark.slow),
-        *[("miqcp-bilinear", 2), ("milp-mccormick", 1)],
-    ],
-)
+@pytest.mark.parametrize("formulation, width", [QUARTIC, ("miqcp-bilinear", 2), ("milp-mccormick", 1)])
 def test_baron_solves_its_file_to_the_optimum(formulation, width, tmp_path):
     """Its free edition takes 10 columns and 10 rows: two pixels at most."""
     window = {"stroke_coefficient": 1.0, "skew_coefficient": 1e-2, "gauge": "box"}

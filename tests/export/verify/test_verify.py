@@ -57,6 +57,17 @@ def verified(tmp_path_factory):
     return done
 
 
+@pytest.mark.slow
+def test_every_solver_proves_what_it_takes_of_two_pixels(tmp_path):
+    """No time limit comes near: convex problems, or linear ones with products of binaries, of two pixels."""
+    proven = ("miqcp-bilinear-l1", "miqp-mccormick", "milp-mccormick", "qp-fixed", "miqp-exact")
+    cf.write_all(on_grid(1, 2), tmp_path, formulations=proven, start=make_field(on_grid(1, 2)))
+    solves = [f for f in verify(tmp_path, seconds=250).checks if f.step == "solve"]
+    assert {f.verdict for f in solves} <= {Verdict.AGREES, Verdict.REFUSED, Verdict.NOT_TRIED}
+    present = {name for name, solver in SOLVERS.items() if not solver.missing}
+    assert {f.program for f in solves if f.verdict == Verdict.AGREES} == present
+
+
 def test_a_point_may_save_only_what_the_rows_it_breaks_are_worth(tmp_path):
     """Slacks of weighted deviations, each reduced by a solver's tolerance for its row: the same field."""
     problem = cf.formulate(cf.sample("skew", 4), "milp-mccormick")

@@ -76,9 +76,8 @@ def test_polylines_of_an_obj_are_strokes_along_edges(tmp_path):
     instance = cf.read_mesh(path, boundary=False)
     assert strokes_of(instance) == pytest.approx({0: np.pi / 4, 1: np.pi / 4})
     write_square(path, "f -4 -3 -2", "f 3 4 1", "l 1 2 4")
-    with pytest.raises(
-        cf.InstanceError, match=r"a.obj: a polyline goes from vertex 2 to vertex 4 \(from 1\)"
-    ):
+    message = r"a.obj: a polyline goes from vertex 2 to vertex 4 \(from 1\)"
+    with pytest.raises(cf.InstanceError, match=message):
         cf.read_mesh(path)
 
 
@@ -423,9 +422,8 @@ def test_merging_stays_within_what_is_a_mesh(tmp_path):
     for merge in (None, 0, 1e-6):
         instance = cf.read_mesh(write_obj(path, both), merge=merge)
         assert (instance.mesh.parts, instance.reading.warnings) == (2, ())
-    with pytest.raises(
-        cf.InstanceError, match=r"a.obj: has an edge of length 1 at its boundary; merge at a smaller"
-    ):
+    message = r"a.obj: has an edge of length 1 at its boundary; merge at a smaller"
+    with pytest.raises(cf.InstanceError, match=message):
         cf.read_mesh(write_obj(path, flat_sheet(3, 3)), merge=1.5)
     write_square(path, "v 0 0 0", "v 1 1 0", "f 1 2 3", "f 6 4 5", "l 5 3", "l 1 5")
     assert strokes_of(cf.read_mesh(path, merge=0, boundary=False)) == pytest.approx(

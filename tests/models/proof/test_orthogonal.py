@@ -10,6 +10,7 @@ from dataclasses import replace
 import crossfield as cf
 import numpy as np
 import pytest
+from certificate_arrays import with_head
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
 from crossfield.models.processes.deadline import Deadline, never, silent
 from crossfield.models.proof.certificate import check_proof
@@ -254,3 +255,13 @@ def test_no_changed_array_proves_more_than_is_true(forgeable):
                 assert claim.bound <= optimum + 1e-9, name
                 assert claim.status == "gap" or claim.energy <= optimum + 1e-7, name
     assert refused
+
+
+def test_claims_beyond_the_proof_are_refused(forgeable):
+    optimum, (best, worse) = forgeable
+    assert accepts(best).status == "optimal"
+    assert accepts(worse).status == "gap"
+    for changes in ({"bound": 1.01 * optimum}, {"status": "optimal"}, {"threshold": 0.9 * optimum}):
+        assert accepts(with_head(worse, **changes)) is None
+    assert accepts(with_head(best, bound=1.01 * optimum)) is None
+    assert accepts(with_head(best, energy=0.9 * optimum)) is None

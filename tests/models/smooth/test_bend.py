@@ -7,6 +7,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from angles import HALF
+from crossfield.models.smooth import polyvector, two_levels
 from crossfield.models.smooth.bend import HARMONIC, HOLD, TREMBLE, tremble
 from crossfield.models.smooth.polyvector import HOLDS
 from exhaustive import sketch
@@ -119,3 +120,18 @@ def test_more_rounds_lower_the_energy_and_none_returns_the_start():
     assert bent(0) is start
     energies = [bend_energy(bent(rounds)) for rounds in (1, 2, 3)]
     assert energies == sorted(energies, reverse=True)
+
+
+@pytest.mark.parametrize("name", ["mouse", "bottle"])
+def test_two_levels_find_the_fields_that_factors_find(name, monkeypatch):
+    instance = cf.sample(name, 64)
+    fields = []
+    for few in (0, instance.grid.size):
+        monkeypatch.setattr(polyvector, "FEW", few)
+        monkeypatch.setattr(two_levels, "FEW", few)
+        start = cf.polyvector_field(instance, hold=100.0)
+        fields.append((start, cf.bend_field(start)))
+    (start, bend), (exact_start, exact_bend) = fields
+    assert np.array_equal(start.p, exact_start.p)
+    assert start.cross_error(exact_start.u_angle, exact_start.v_angle) == pytest.approx(0, abs=1e-6)
+    assert bend.energy(2).total == pytest.approx(exact_bend.energy(2).total, rel=2e-3)
