@@ -33,6 +33,8 @@ settings.load_profile("same")
 signal.signal(signal.SIGINT, signal.default_int_handler)
 
 LEFT_OUT = pytest.StashKey[dict[str, int]]()
+LONGEST = {"conformance", "project"}
+"""Folders with the files that take longest."""
 
 
 @pytest.fixture
@@ -88,7 +90,7 @@ def pytest_collection_modifyitems(config, items):
     items[:] = [item for item, reason in zip(items, reasons, strict=True) if not reason]
     config.stash[LEFT_OUT] = dict(Counter(filter(None, reasons)))
     # Workers take whole files in this order; long files at the end would keep one of them busy alone.
-    items.sort(key=lambda item: item.path not in long)
+    items.sort(key=lambda item: (item.path not in long, item.path.parent.name not in LONGEST))
     if slow and config.option.markexpr == "not slow" and not config.option.keyword:
         config.stash[LEFT_OUT]["slow; run them with -m slow"] = slow
     return result
