@@ -26,9 +26,7 @@ def connect_cluster(address: str) -> Iterator[Any]:
             "a scheduler needs dask; pip install '.[cluster]' in a clone, here and on the workers"
         ) from error
     try:
-        client: Any = distributed.Client(  # type: ignore[no-untyped-call]
-            address, timeout=_PATIENCE, set_as_default=False
-        )
+        client: Any = distributed.Client(address, timeout=_PATIENCE, set_as_default=False)
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
             f"no scheduler answers at {address[:100]}; start one with `dask scheduler`, "
