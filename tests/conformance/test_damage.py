@@ -128,7 +128,7 @@ def examples(tmp_path_factory):
 
 
 @pytest.mark.parametrize("name", FILES)
-@pytest.mark.parametrize("count", [20, pytest.param(200, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.slow)])
 def test_whatever_the_bytes_the_error_is_ours_and_names_the_file(name, count, examples, tmp_path):
     read, rng = FILES[name][1], np.random.default_rng(count)
     for path, whole in ((tmp_path / title, whole) for title, whole in examples[name].items()):

@@ -297,7 +297,7 @@ def solvers():
 
 
 @pytest.mark.slow
-@settings(max_examples=60)
+@settings(max_examples=40)
 @given(instances(), st.sampled_from([*FORMULATIONS]), st.booleans())
 def test_bundled_solvers_agree_on_instances_of_any_kind(
     solvers, tmp_path_factory, instance, formulation, relax

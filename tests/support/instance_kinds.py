@@ -176,15 +176,15 @@ TINY: Final = [name for name in KINDS if kind(name).domain.size <= 9]
 
 
 def crossed(*columns: Any, every: int, slow: Any = ()) -> list[Any]:
-    """Parameters of combinations: those whose places add up to a multiple of twice `every`, and twice as many
-    more that are slow. Kinds of more than 400 points, and `slow` ones, are never quick.
+    """Parameters of combinations: those whose places add up to a multiple of twice `every`, and as many more
+    that are slow. Kinds of more than 400 points, and `slow` ones, are never quick.
     """
     parameters = []
     for cells in itertools.product(*map(enumerate, columns)):
         places, values = zip(*cells, strict=True)
         turn, rest = divmod(sum(places), every)
-        if rest == 0 or (rest == every // 2 and turn % 2):
-            is_slow = rest or turn % 2 or not {*values}.isdisjoint([*MANY, *slow])
+        if rest == 0:
+            is_slow = turn % 2 or not {*values}.isdisjoint([*MANY, *slow])
             parameters.append(pytest.param(*values, marks=pytest.mark.slow if is_slow else ()))
     return parameters
 
