@@ -1,5 +1,6 @@
 """Every command and every function that writes: files in the way, files that are read, worse results."""
 
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -32,7 +33,7 @@ def test_no_file_of_the_user_is_replaced_unless_forced(name, source, tmp_path, c
     assert invoke(command) == 0  # its own files are replaced
     written = contents(folder)
     capsys.readouterr()
-    for file in written:
+    for file in {re.sub(r"/.*[.]", "/", name): name for name in written}.values():  # one of many models
         (folder / file).write_bytes(b"user's")
         before = contents(folder)
         assert invoke(command) == 1, file

@@ -16,11 +16,16 @@ from places import ROOT
 pytestmark = pytest.mark.slow
 
 ALL_NAMES = """
-import pathlib, crossfield
-assert pathlib.Path(crossfield.__file__).parent.parent == pathlib.Path.cwd(), crossfield.__file__
-for name in crossfield.__all__:
-    getattr(crossfield, name)
-print(*crossfield.__all__)
+import pathlib, sys
+for place in sys.argv[1:]:  # packages that others need are loaded once
+    sys.path[0] = place
+    import crossfield
+    assert pathlib.Path(crossfield.__file__).parent.parent == pathlib.Path(place), crossfield.__file__
+    for name in crossfield.__all__:
+        getattr(crossfield, name)
+    print(*crossfield.__all__)
+    for module in [each for each in sys.modules if each.split(".")[0] == "crossfield"]:
+        del sys.modules[module]
 """
 
 CORE_WORK = """
@@ -76,10 +81,11 @@ def run_python(place, *arguments):
 
 def test_without_a_room_all_names_of_the_others_are_there(rooms, tmp_path):
     home = import_module("crossfield")._HOME
-    for name in rooms.ROOMS.keys() - {rooms.CORE}:
-        place = tmp_path / name
-        copy_without(rooms, {name}, place)
-        left = run_python(place, "-c", ALL_NAMES).split()
+    places = [tmp_path / name for name in rooms.ROOMS if name != rooms.CORE]
+    for place in places:
+        copy_without(rooms, {place.name}, place)
+    shown = run_python(tmp_path, "-c", ALL_NAMES, *map(str, places)).splitlines()
+    for place, left in zip(places, map(str.split, shown), strict=True):
         assert left == [one for one in sorted(home) if (place / "crossfield" / file_of(home[one])).is_file()]
         assert "formulate" in left
 

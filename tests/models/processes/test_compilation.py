@@ -55,11 +55,8 @@ def test_code_is_cached_for_the_user_and_compiled_again_in_another_version(call,
     assert call(**folder) == ["True", "4.0", "True"]
     assert len([*(tmp_path / "mine").rglob("*.nbi")]) == 2
     assert call(name="Weights", **folder) == ["False", "4.0", "True"]
-    assert call(factor=3.0, **folder) == [
-        "False",
-        "6.0",
-        "True",
-    ]  # Numba compares the file of the caller only
+    # Numba compares the file of the caller only.
+    assert call(factor=3.0, **folder) == ["False", "6.0", "True"]
 
 
 def test_the_folder_of_numba_is_taken(call, tmp_path):

@@ -22,8 +22,8 @@ from proofs_round_fields import prove_round
 REFUSED = (check_certificate.NotProvenError, check_certificate.UnreadableError)
 KINDS = ("optimal", "a window binds", "a worse field", "tables", "norm 1", "norm mixed")
 COARSE = 2.0**-12
-TRIES = 3
-"""Places of every array that are changed, each once up and once down."""
+TRIES = 1
+"""Places of every array that are changed, each once up and once down; others for every kind."""
 
 
 def proof_of_kind(kind):
@@ -131,7 +131,7 @@ def test_no_changed_number_makes_a_false_claim_pass(kind, honest):
     """
     arrays = check_certificate.read_arrays(str(honest(kind)))
     arrays = {name: arrays[name] for name in sorted(arrays)}  # the same changes for any order in the file
-    rng, known, counts = np.random.default_rng(7), {}, Counter()
+    rng, known, counts = np.random.default_rng([7, KINDS.index(kind)]), {}, Counter()
     for name, other in changes(arrays, rng):
         for held in [other, *modest(name, other)]:
             bound = confirmed_bound(held)

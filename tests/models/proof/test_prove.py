@@ -163,7 +163,7 @@ def test_a_mesh_whose_levels_do_not_fit_has_the_field_of_its_search_and_the_reas
         from crossfield.models.mesh.shapes import torus
 
         resource.setrlimit(resource.RLIMIT_AS, (2 << 30, 2 << 30))
-        mesh = torus(150, 150)
+        mesh = torus(126, 126)
         at = np.arange(0, mesh.size, 50)
         instance = Instance.on_faces("torus", mesh, at, np.linspace(0, 3, len(at)), np.ones(len(at)))
         lines = []
@@ -178,7 +178,7 @@ def test_a_mesh_whose_levels_do_not_fit_has_the_field_of_its_search_and_the_reas
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     counts, error = result.stdout.splitlines()
     assert counts == "interrupted 0 True"
-    assert "the coarsest level has 17280000 pairs of labels" in error
+    assert "the coarsest level has 12192768 pairs of labels" in error
 
 
 def test_the_time_that_no_level_uses_goes_to_the_search(monkeypatch):
