@@ -29,8 +29,8 @@ def test_no_file_of_the_user_is_replaced_unless_forced(name, source, tmp_path, c
     folder = tmp_path / "out"
     folder.mkdir()
     command = words(name, folder, source)
-    assert invoke(command) == 0
-    assert invoke(command) == 0  # its own files are replaced
+    for _ in range(1 if name == "run" else 2):  # its own files are replaced; runs have tests of that below
+        assert invoke(command) == 0
     written = contents(folder)
     capsys.readouterr()
     for file in {re.sub(r"/.*[.]", "/", name): name for name in written}.values():  # one of many models
