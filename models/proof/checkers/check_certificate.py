@@ -1008,14 +1008,10 @@ class BoxPiece:
 
     def weights(self, terms: EnergyTerms, theta: Array) -> list[Array]:
         """The weights of all residuals with which F in the piece is bounded (sections 6 and 9)."""
-        i, j = self.boxes[terms.first], self.boxes[terms.second]
-        a = np.maximum(np.abs(i[:, 0] - j[:, 1] + HALF * self.p), np.abs(i[:, 1] - j[:, 0] + HALF * self.p))
-        known = self.has_known_jump(terms)
-        share = np.clip((HALF - a - 1e-9) / np.maximum(a, 1e-9), 0.0, 1.0) ** (2 if terms.norm == 2 else 1)
-        reach = QUARTER if terms.norm == 1 else HALF
+        known, reach = self.has_known_jump(terms), QUARTER if terms.norm == 1 else HALF
         far = (excess_over_windows(theta, self.boxes) > reach - 1e-9).any(axis=0)
         of_a, of_b, of_r, of_beta = terms.weights
-        return [of_a * np.where(known, 1.0, share), of_b * known, of_r * ~far, of_beta]
+        return [of_a * known, of_b * known, of_r * ~far, of_beta]
 
 
 def greatest_a(terms: EnergyTerms, boxes: Array, e: int, p: int) -> float:
