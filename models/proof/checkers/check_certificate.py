@@ -94,11 +94,6 @@ def read_file(path: str) -> bytes:
         raise UnreadableError(f"cannot be read ({type(error).__name__})") from error
 
 
-def read_arrays(path: str) -> dict[str, Array]:
-    """Read the arrays of a certificate."""
-    return unpack_arrays(read_file(path))
-
-
 def unpack_arrays(data: bytes) -> dict[str, Array]:
     """Unpack the arrays of a certificate, and check their names and the memory for the check."""
     arrays = unpack_archive(data)

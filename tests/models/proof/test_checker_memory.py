@@ -50,7 +50,7 @@ def arrays(tmp_path_factory):
     for pair in (False, True):
         instance = random_instance(0, (1, 2), 2) if pair else sketch(np.ones((1, 1), bool), np.ones((1, 1)))
         cf.write_certificate(prove_round(optimum(instance), levels=1), folder / "it.npz")
-        by_pair[pair] = check_certificate.read_arrays(str(folder / "it.npz"))
+        by_pair[pair] = check_certificate.unpack_arrays((folder / "it.npz").read_bytes())
     return by_pair
 
 
