@@ -98,6 +98,11 @@ class Domain(ABC):
         """The ring around each inner corner."""
 
     @property
+    def fans(self) -> Walks:
+        """Open walks along the boundary, each around one corner, where strokes may lie; here none."""
+        return Walks(np.zeros(1, np.int32), np.zeros(0, np.int32), np.zeros(0, np.int32))
+
+    @property
     @abstractmethod
     def ring_vertices(self) -> Ints:
         """The vertex inside each ring, as `mesh_of` numbers them, ascending, shape (r,)."""

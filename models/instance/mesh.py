@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..arguments import float_array, whole_numbers
 from ..errors import MeshError
 from .angles import arctangent, wrap
-from .domain import Bools, Domain, Floats, Ints, Rings
+from .domain import Bools, Domain, Floats, Ints, Rings, Walks
 
 MOST_FACES: Final = 2_000_000
 _FARTHEST: Final = 1e30  # coordinates whose products are finite numbers
@@ -296,14 +296,25 @@ class Mesh(Domain):
     @cached_property
     def rings(self) -> Rings:
         """The ring around each vertex of `ring_vertices`."""
-        crossed, ring = self._walk_around(self.ring_vertices)
+        walks = self._pairs_around(self.ring_vertices)
+        return Rings(walks.start, walks.pair, walks.sign, self.defect[self.ring_vertices])
+
+    @property
+    def fans(self) -> Walks:
+        """The walk around each vertex on the boundary, from one boundary edge to the other."""
+        return self._pairs_around(np.unique(self._edges[0][self.boundary]))
+
+    def _pairs_around(self, vertices: Ints) -> Walks:
+        """The walk around each vertex, counter-clockwise."""
+        crossed, place = self._walk_around(vertices)
+        inner = self.opposite[crossed] >= 0
+        crossed, place = crossed[inner], place[inner]
         pair_of = np.full(3 * self.size, -1, dtype=np.int32)
         pair_of[self.pair_edges] = np.arange(len(self.pair_edges), dtype=np.int32)
         forward = pair_of[crossed] >= 0
         pair = np.where(forward, pair_of[crossed], pair_of[self.opposite[crossed]])
-        start = np.searchsorted(ring, np.arange(len(self.ring_vertices) + 1)).astype(np.int32)
-        sign = np.where(forward, 1, -1).astype(np.int32)
-        return Rings(start, pair.astype(np.int32), sign, self.defect[self.ring_vertices])
+        start = np.searchsorted(place, np.arange(len(vertices) + 1)).astype(np.int32)
+        return Walks(start, pair.astype(np.int32), np.where(forward, 1, -1).astype(np.int32))
 
     @property
     def euler_characteristic(self) -> int:

@@ -28,7 +28,6 @@ from ..checkers.check_orthogonal import (
     CentredRows,
     Charges,
     Clouds,
-    spans,
     stage_of,
     starts_of,
 )
@@ -48,6 +47,7 @@ _LEAST: Final = 1e-5  # background below which sand is not spread thinner
 _ROUNDING: Final = 1e-12  # relative: of the charges of a cloud, far above what a checker deducts
 _NEAR: Final = 0.1  # of what joins a loop to others: how fast charges count less with distance
 _DIGITS: Final = 9  # of charges: those that symmetry makes equal are, however a mesh is numbered
+_MIXED: Final = 0.25  # share of loops with both signs: above, levels prove more if all parts have strokes
 _ROUNDS: Final = 12  # of a stage
 _STEPS: Final = 300  # of gradients for a potential
 _HALVINGS: Final = 60  # of the range of a multiplier
@@ -60,13 +60,16 @@ def charge_arrays(
 ) -> Arrays:
     """The arrays of charges in a certificate; none without rings, or without the time for a first round.
 
+    None either where all parts have strokes, and too many loops may have charges of both signs.
+
     threshold: as of `Proof`. quick: whether to end after the first round.
     """
-    arrays = _ring_loops(domain, rows) if len(domain.rings.defect) else {}
-    if not arrays or len(arrays["loop_start"]) == 1:
+    arrays = _loops(domain, rows) if len(domain.rings.defect) else {}
+    if not arrays:
         return {}
     charges, best = Charges(arrays, rows), 0.0
-    if charges.most.max() > np.iinfo(np.uint8).max:
+    mixed = float(charges.most.all(axis=0).mean())
+    if charges.most.max() > np.iinfo(np.uint8).max or (mixed > _MIXED and not rows.fixed[:-1].any()):
         return {}
     remaining, stages = charges.most, _Stages(charges)
     for number in range(MOST_STAGES):
@@ -82,20 +85,49 @@ def charge_arrays(
     return arrays if "stages" in arrays else {}
 
 
-def _ring_loops(domain: Domain, rows: CentredRows) -> Arrays:
-    """The arrays of loops: rings without rows of too little weight, neighbours close to each other."""
-    rings, count = domain.rings, len(domain.rings.defect)
-    ring = np.repeat(np.arange(count), np.diff(rings.start))
-    light = np.bincount(ring, rows.weight[rings.pair] < RELATIVE, count) > 0
-    uses = coo_array((np.ones(len(ring)), (ring, rings.pair)), shape=(count, rows.pairs)).tocsr()
+def _loops(domain: Domain, rows: CentredRows) -> Arrays:
+    """The arrays of loops, if any: rings, and fans along the boundary, neighbours close to each other.
+
+    Between two points with strokes, they lead through the ground, if no other loop has these strokes in
+    the same direction, and fall into parts there. Fans have to. No loop has a row of too little weight.
+    """
+    fans, rings, heavy = domain.fans, domain.rings, rows.weight >= RELATIVE
+    pair = np.append(np.insert(fans.pair, fans.start[1:], -1), rings.pair)  # -1 closes a fan
+    sign = np.append(np.insert(fans.sign, fans.start[1:], 1), rings.sign)
+    start = starts_of(np.append(np.diff(fans.start) + 1, np.diff(rings.start)))
+    count, step = len(start) - 1, np.arange(len(pair))
+    walk, before, after = np.repeat(np.arange(count), np.diff(start)), step - 1, step + 1
+    before[start[:-1]], after[start[1:] - 1] = start[1:] - 1, start[:-1]
+    ends = rows.first[pair], rows.second[pair]
+    tail, head, closes = np.where(sign > 0, *ends), np.where(sign < 0, *ends), pair < 0
+    tail[closes], head[closes] = head[before[closes]], tail[after[closes]]
+    stroke, own = np.full(rows.size + 1, -1), rows.pairs + np.nonzero(heavy[rows.pairs :])[0]
+    stroke[rows.first[own]] = own
+    cut = (stroke[tail] >= 0) & (stroke[head] >= 0) & (closes | (walk >= len(fans.start) - 1))
+    while True:
+        kept = ~cut & (np.bincount(walk, ~cut & (closes | ~heavy[pair]), count) == 0)[walk]
+        begin, end = np.nonzero(kept & cut[before])[0], np.nonzero(kept & cut[after])[0]
+        _, first = np.unique(np.append(tail[begin], rows.size + head[end]), return_index=True)
+        if len(first) == len(begin) + len(end):
+            break
+        cut[np.delete(np.append(before[begin], after[end]), first)] = False
+    part = np.cumsum(cut) + walk
+    last = part == part[start[1:] - 1][walk]  # the last part of a walk is one with its first
+    part[last] = (part - cut)[start[:-1]][walk[last]]
+    kept = np.nonzero(kept)[0]
+    row = np.concatenate([pair[kept], stroke[tail[begin]], stroke[head[end]]])
+    sign = np.concatenate([sign[kept], np.full(len(begin), -1), np.full(len(end), 1)])
+    found, loop = np.unique(part[np.concatenate([kept, begin, end])], return_inverse=True)
+    if not len(found):
+        return {}
+    uses = coo_array((np.ones(len(row)), (loop, row)), shape=(len(found), len(heavy))).tocsr()
     order = reverse_cuthill_mckee((uses @ uses.T).tocsr(), symmetric_mode=True)
-    order = order[~light[order]]
-    sizes = np.diff(rings.start)[order]
-    steps = spans(rings.start[order], sizes)
+    place = np.argsort(order)[loop]
+    step = np.argsort(place, kind="stable")
     return {
-        "loop_start": starts_of(sizes).astype(np.int32),
-        "loop_row": rings.pair[steps],
-        "loop_sign": rings.sign[steps].astype(np.int8),
+        "loop_start": starts_of(np.bincount(place, minlength=len(found))).astype(np.int32),
+        "loop_row": row[step].astype(np.int32),
+        "loop_sign": sign[step].astype(np.int8),
     }
 
 

@@ -2,8 +2,8 @@
 
 docs/orthogonal-proofs.md has the lemmas. On every level a dual rises (orthogonal_dual.py), a field is rounded
 from it, and the checker (check_orthogonal.py) computes the bound and what is left. The next level has a third
-of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters. Where a part
-has no stroke, charges (charges.py) give a first bound.
+of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters. Where
+many points have no stroke, charges (charges.py) give a first bound.
 """
 
 from __future__ import annotations
@@ -58,6 +58,7 @@ _MANY: Final = 0.1  # share of new rings above which they may come into use at t
 _LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one, and no chain follows a search
 _STARTS: Final = 0.3  # of the time, after which no start is rounded with care
 _CHARGES: Final = 0.5  # of the time, which charges leave
+_MANY_FREE: Final = 400  # points without strokes above which levels exclude little, and charges are tried
 _LOOK: Final = 1e-4  # seconds per point of a first look at charges, and of its check, where points are many
 _PULL: Final = 1e-9  # relative: makes the matrix of prescribed rings of a closed part definite
 _TUNING: Final = 0.1  # of the time, in which the multipliers of prescribed sums rise
@@ -196,12 +197,13 @@ class _Prover:
             step = (most - best) / np.pi * lacking / max(lacking @ lacking, 1.0)
 
     def _bound_by_charges(self) -> str:
-        """Bound the energy by charges where a part has no stroke; the reason why no level follows.
+        """Bound the energy by charges where strokes are few; the reason why no level follows.
 
         It is due at the beginning and, while levels prove less, for better fields, which exclude more.
         """
         ends, quick, many = self.ends, self.rows is None, self.instance.domain.size > checker.MOST_DENSE
         free, expected = len(self.energy.pins) > 0, _LOOK * self.instance.domain.size
+        free |= not many and self.instance.domain.size - len(self.instance.theta) > _MANY_FREE
         if quick and many and free and ends.is_over(expected):
             self._leave_out(f"charges take about {expected:.0f} s, which needs a longer time limit")
             free = False
@@ -222,7 +224,7 @@ class _Prover:
             arrays = charge_arrays(self.instance.domain, rows, chain.threshold, is_over, quick=quick)
             checking = clock()
             bound = checker.charges_bound(arrays, rows, chain.threshold)
-            self.charged = math.inf if quick else self.least
+            self.charged = math.inf if quick and arrays else self.least
             self.look = clock() - begin
             if bound > self.charges:
                 before = chain.arrays.keys() - self.of_charges.keys()

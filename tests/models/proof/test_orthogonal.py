@@ -13,13 +13,14 @@ import pytest
 from certificate_arrays import with_head
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
 from crossfield.models.processes.deadline import Deadline, never, silent
+from crossfield.models.proof.bound import charges
 from crossfield.models.proof.certificate import check_proof
 from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError
 from crossfield.models.proof.descent import orthogonal
 from crossfield.models.proof.descent.descent import Termination
 from crossfield.models.proof.descent.orthogonal import prove_orthogonal
-from instance_kinds import apart
+from instance_kinds import apart, surface
 from meshes import torus
 from orthogonal_certificates import certificate_at
 from small_meshes import (
@@ -30,6 +31,7 @@ from small_meshes import (
     prove_from,
     random_hull,
     random_instance,
+    random_mesh,
     strokeless,
     torus_of_seven,
     try_all_integers,
@@ -104,10 +106,7 @@ def admits_charges(arrays, instance, z):
     return ((particles < charges.most[0] + 0.5) & (particles > -charges.most[1] - 0.5)).all()
 
 
-STRETCHED = [(1, 1, 1), (1, 1, 1e-3), (1, 1, 30)]
-
-
-@pytest.mark.parametrize("stretch", STRETCHED)
+@pytest.mark.parametrize("stretch", [(1, 1, 1), (1, 1, 1e-3), (1, 1, 30)])
 @pytest.mark.parametrize("points", [4, 5, 6])
 def test_charges_have_the_optimum_of_closed_surfaces_and_bound_it(points, stretch):
     mesh = random_hull(points, points, stretch)
@@ -119,18 +118,23 @@ def test_charges_have_the_optimum_of_closed_surfaces_and_bound_it(points, stretc
     assert admits_charges(arrays, instance, z)
 
 
-@pytest.mark.parametrize("other", ["closed", "stroked"])
+@pytest.mark.parametrize("kind", ["closed", "stroked", "sheet", "edges"])
 @pytest.mark.parametrize("seed", range(3))
-def test_charges_of_parts_and_weights_do_not_exceed_the_optimum(seed, other):
-    rng, second = np.random.default_rng(seed), random_hull(seed, 4, (1, 1, 3))
-    strokes = [np.zeros(0)] * 3
-    if other == "stroked":
-        second, strokes = fan().domain, [np.array([4, 6]), np.array([0.3, 1.2]), np.ones(2)]
-    mesh = apart(random_hull(seed, 4), second)
-    weights = {"pair_weights": rng.uniform(0.1, 5, len(mesh.first)), "orthogonal": True}
-    instance = cf.Instance.on_faces("parts", mesh, strokes[0].astype(int), *strokes[1:], **weights)
+def test_charges_of_parts_strokes_and_weights_do_not_exceed_the_optimum(seed, kind, monkeypatch):
+    monkeypatch.setattr(charges, "_MIXED", 1.0)
+    rng, hull = np.random.default_rng(seed), random_hull(seed, 4)
+    sheet = random_mesh(rng, 7)
+    mesh, at = {
+        "closed": (apart(hull, random_hull(seed, 4, (1, 1, 3))), []),
+        "stroked": (apart(hull, fan().domain), [4, 6]),
+        "edges": (random_hull(seed, 5), [0, 1, 2]),
+        "sheet": (sheet, np.unique(sheet.boundary // 3)),
+    }[kind]
+    instance = surface(mesh, at, seed=seed, pair_weights=rng.uniform(0.1, 5, len(mesh.first)))
     optimum, z = try_all_integers(instance)
     arrays = prove_from(instance, z, levels=1).certificate()
+    arrays |= charges.charge_arrays(mesh, checker.CentredRows(arrays), optimum + 1e-9, never)
+    assert (arrays["loop_row"] >= len(mesh.first)).any() == (kind in ("sheet", "edges"))
     assert bound_of_charges(arrays) <= optimum + 1e-9
     assert admits_charges(arrays, instance, z)
 
@@ -142,8 +146,8 @@ def test_charges_do_not_exceed_the_optimum_of_a_torus():
     assert 0 < bound_of_charges(arrays) <= least_of_charges(instance.domain) < optimum - 0.1
 
 
-def test_charges_alone_may_meet_the_gap():
-    proof = cf.prove(strokeless(torus(32, 16)), limits=cf.Limits(gap=0.05))
+def test_charges_alone_may_meet_the_gap_beside_a_stroke():
+    proof = cf.prove(surface(torus(32, 16), [0]), limits=cf.Limits(gap=0.05))
     assert (proof.ended, proof.levels) == ("gap", ())
     assert checker.check_arrays(proof.certificate()).bound == proof.bound > 0.95 * proof.energy
 

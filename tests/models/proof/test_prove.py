@@ -184,7 +184,7 @@ def test_a_mesh_whose_levels_do_not_fit_has_the_field_of_its_search_and_the_reas
 def test_the_time_that_no_level_uses_goes_to_the_search(monkeypatch):
     # every line of progress is a tick of the clock: a round of the search
     monkeypatch.setattr(orthogonal, "_MOST_COSTS", 1000)
-    instance, results = cf.sample("half_torus"), []
+    instance, results = cf.sample("pin"), []
     for find in (cf.search, cf.prove):
         lines = []
         limits = cf.Limits(3.0, gap=0.0).until(Deadline(3.0, lambda lines=lines: float(len(lines))))
