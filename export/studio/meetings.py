@@ -12,6 +12,7 @@ from scipy.spatial import KDTree
 from ...models.instance.angles import line_difference
 from ...models.instance.domain import Bools, Floats, Ints
 from ...models.sketch.cover import Frame, fit_frame
+from ...models.surface.trust import OFF
 from .document import Document
 
 _SIZE: Final = 48  # pixels of the longer side of the grid that decides, for fields of every size
@@ -19,7 +20,7 @@ _NEAR: Final = 1.5  # pixels between two lines that meet
 _CROWD: Final = 4  # points of one direction in a pixel: more of them meet nothing else
 _APART: Final = np.radians(30)  # least angle between lines of two families; strokes tremble by less
 _STEADY: Final = 3  # pixels to either side over which a direction is measured, for the same reason
-_LONG: Final = 8  # pixels of a stroke that can be suspected; pieces of a traced picture are shorter
+_LONG: Final = 8  # pixels of a stroke that can be suspected; links in junctions of a picture are shorter
 _END: Final = 8.0  # pixels from the end of a line, at most a quarter of it, where all lines meet at a pole
 _SPOT: Final = 2.0  # pixels between meetings at one place
 _THICKET: Final = 20_000  # pairs of lines that meet, from which on no net can be told
@@ -99,9 +100,9 @@ def find_suspects(document: Document, misfit: Floats) -> list[int]:
 
     Curvature lines of one family never cross, so one of three lines that all cross each other is none. The
     stroke in most such triples is suspected; of several, the one that fits the surface least, unless even
-    that fits at half of its pixels. Lines may meet at a pole, in one place or at their ends.
+    that fits. Lines may meet at a pole, in one place or at their ends.
 
-    misfit: share of the pixels of each stroke where the crosses do not fit the surface.
+    misfit: mean deviation of the crosses at each stroke from a right angle on the surface, in radians.
     """
     numbers, lines = lines_of(document, frame_of(document.segments()[0]))
     long = np.array([len(line) > _LONG for line in lines], dtype=bool)
@@ -118,7 +119,7 @@ def find_suspects(document: Document, misfit: Floats) -> list[int]:
         triples -= np.bincount(at_spot % len(lines), at_poles, len(lines))
         most = np.flatnonzero(triples == triples.max())
         worst = most[np.argmax(misfit[numbers[most]])]
-        if triples[worst] <= 0 or (len(most) > 1 and misfit[numbers[worst]] <= 0.5):
+        if triples[worst] <= 0 or (len(most) > 1 and misfit[numbers[worst]] <= OFF):
             break
         suspects.append(int(numbers[worst]))
         others = (pairs != worst).all(axis=1)

@@ -18,7 +18,7 @@ from ...models.sketch.cover import Box, block_means
 from ...models.sketch.curves import Curves, flatten, run_numbers
 from ...models.sketch.drawing_file import detect_file_kind, parse_drawing
 from ...models.sketch.parallels import find_non_edges
-from ...models.sketch.thinning import smooth_way, trace_shape
+from ...models.sketch.thinning import join_ways, smooth_way, trace_shape
 from .document import MOST_SENT, PICTURE_SIDE, Document, Mark, digest_of, read_strokes
 
 _FINE: Final = 1 / 2000  # greatest distance of a polyline from its curve, as a share of the drawing
@@ -103,7 +103,7 @@ def _strokes_of_curves(curves: Curves, ignored: Bools) -> tuple[Box, list[dict[s
 
 
 def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
-    """Page and strokes of a picture: the middle lines of its ink, from one end or junction to the next."""
+    """Page and strokes of a picture: the middle lines of its ink, straight on across junctions."""
     reduced = max(1.0, max(picture.ink.shape) / _THINNED)
     rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in picture.ink.shape)
     small = block_means(picture.ink, rows, columns)
@@ -111,14 +111,18 @@ def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
     ways = trace_shape(small * max(1.0, reduced / picture.stroke_width) > _INK)
     is_red = np.array([np.median(red[tuple(way.T)]) > _RED for way in ways], dtype=bool)
     as_lines = is_red if picture.has_two_colours and is_red.any() else np.ones(len(ways), dtype=bool)
-    lines = [smooth_way(way) for way in ways]
+    pen = max(1.0, picture.stroke_width / reduced)
+    marks: tuple[tuple[Mark, Bools], ...] = (("cut", ~as_lines), ("line", as_lines))
+    traced = [
+        (mark, smooth_way(way))
+        for mark, chosen in marks
+        if chosen.any()
+        for way in join_ways([ways[number] for number in np.flatnonzero(chosen)], pen)
+    ]
     # Middle lines end half a pen before their ink. On the box of the ink, they are read on the same grid.
-    low, high = (end(np.concatenate(lines), axis=0) for end in (np.min, np.max))
+    low, high = (end(np.concatenate([line for _, line in traced]), axis=0) for end in (np.min, np.max))
     ink = np.reshape(picture.box, (2, 2))
     scale = (ink[1] - ink[0]) / np.where(high > low, high - low, np.inf)
     middle = ink.mean(axis=0) - scale * (low + high) / 2
-    strokes = [
-        _stroke_document(scale * line + middle, "line" if marked else "cut")
-        for line, marked in zip(lines, as_lines, strict=True)
-    ]
+    strokes = [_stroke_document(scale * line + middle, mark) for mark, line in traced]
     return (0.0, 0.0, float(picture.width), float(picture.height)), strokes

@@ -10,7 +10,7 @@ import numpy as np
 from ...models.field.field import CrossField
 from ...models.instance.instance import Instance
 from ...models.processes.child_program import is_stopped
-from ...models.surface.trust import OFF, right_angle_deviation
+from ...models.surface.trust import right_angle_deviation
 from ..pictures.draw import count_singularities
 from ..pictures.marks import split_runs
 from ..pictures.streamlines import streamlines
@@ -104,9 +104,9 @@ def surface_step(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     bands = [part for _, part in raster_surface(lifted, compute_outline(document, instance), view)]
     normals = np.concatenate([part.normals[..., :2] for part in bands])
     opacity = np.concatenate([part.opacity for part in bands])
-    unfit, (stroke, at) = right_angle_deviation(field, lifted.heights) > OFF, drawn.strokes.T
+    off, (stroke, at) = right_angle_deviation(field, lifted.heights), drawn.strokes.T
     strokes = len(document.strokes)
-    misfit = np.bincount(stroke, unfit[instance.stroke_index[at]], strokes)
+    misfit = np.bincount(stroke, off[instance.stroke_index[at]], strokes)
     misfit = misfit / np.maximum(np.bincount(stroke, minlength=strokes), 1)
     return {
         "stage": "surface",
@@ -116,7 +116,6 @@ def surface_step(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
         "height": view.height,
         "normals": encode_array(np.round(_FINE * normals), "i2"),
         "opacity": encode_array(np.round(255 * opacity), "u1"),
-        "doubts": list(lifted.doubts),
         "freedom": [choice.document() for choice in lifted.freedom],
         "suspects": find_suspects(document, misfit),
     }

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
@@ -13,6 +14,9 @@ from ..instance.domain import Bools, Floats
 _SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
 _SHORTEST: Final = 6  # pixels of a traced line; shorter ones, or than a stroke is wide, are burrs
 _SHORTEST_LINK: Final = 4  # pixels of a traced line between two junctions
+_LINK: Final = 2.0  # pens that a link inside a junction is long
+_REACH: Final = 5.0  # pens from the end of a way to that of another one across a junction
+_TURN: Final = np.radians(35)  # greatest angle between a way and its continuation
 _AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
 
 _Pixel = tuple[int, int]
@@ -36,6 +40,45 @@ def trace_shape(shape: Bools, *, trim: bool = False) -> list[NDArray[np.int64]]:
         else way
         for way in ways
     ]
+
+
+def join_ways(ways: Sequence[NDArray[np.int64]], pen: float) -> list[NDArray[np.int64]]:
+    """Traced lines, joined where one continues another one across a junction, the straightest first.
+
+    pen: width of the strokes in pixels. Lines that are shorter than two pens lie inside a junction.
+    """
+    from scipy.spatial import KDTree
+
+    sides = [side for way in ways for side in (way, way[::-1])]
+    far = [side[min(int(4 * pen) + 4, len(side) - 1)] for side in sides]
+    # Thinned strokes turn aside in a junction.
+    inward = np.subtract(far, [side[int(pen) if len(side) > 2 * pen + 3 else 0] for side in sides])
+    inward = inward / np.maximum(np.hypot(*inward.T), 1)[:, None]
+    ends, is_long = (
+        np.array([side[0] for side in sides]),
+        np.array([len(side) > _LINK * pen for side in sides]),
+    )
+    pairs = KDTree(ends).query_pairs(_REACH * pen, output_type="ndarray")
+    pairs = pairs[is_long[pairs].all(axis=1) & (pairs[:, 0] // 2 != pairs[:, 1] // 2)]
+    (first, second), gap = pairs.T, np.diff(ends[pairs], axis=1)[:, 0]
+    length = np.hypot(*gap.T)
+    ahead = np.sum(gap * (inward[second] - inward[first]), axis=1) / 2 / np.maximum(length, 1)
+    straight = -np.sum(inward[first] * inward[second], axis=1)
+    straight = np.where(length > _LINK * pen, np.minimum(straight, ahead), straight)
+    after = np.full(len(sides), -1)
+    for pair in pairs[np.argsort(-straight, kind="stable")][: np.sum(straight > np.cos(_TURN))]:
+        if (after[pair] < 0).all():
+            after[pair] = pair[::-1]
+    joined, used = [], np.zeros(len(ways), dtype=bool)
+    for begin in np.argsort(after >= 0, kind="stable"):  # what is left at last are closed lines
+        parts, end = [], begin
+        while end >= 0 and not used[end // 2]:
+            used[end // 2] = True
+            parts.append(sides[end])
+            end = after[end ^ 1]
+        if parts:
+            joined.append(np.concatenate([*parts, parts[0][:1]] if end >= 0 else parts))
+    return joined
 
 
 def thin_shape(shape: Bools) -> Bools:

@@ -222,7 +222,6 @@ function doubts() {
   state.suspects = new Set(some);
   if (some.length) item(some.length === 1 ? "1 stroke crosses lines that cross each other. Probably it is not a curvature line, or is hidden." : `${some.length} strokes cross lines that cross each other. Probably they are not curvature lines, or are hidden.`,
     action(some.length === 1 ? "Select it" : "Select them", () => select(some)), action(some.length === 1 ? "Mark as cut" : "Mark as cuts", () => { select(some); mark("cut"); }));
-  for (const text of settled ? surface.doubts : []) item(`Surface: ${text}.`);
   for (const choice of settled ? surface.freedom : []) item(`Your choice: ${choice.text}.`, choice.kind === "side" ? action("It is a bowl", () => commit({ concave: [...bowls(), [choice.x, choice.y]] }))
     : action("Take another depth", () => commit({ hints: [...state.doc.hints, hintOf(choice)] })));
   if (!items.length) items.push(element("li", settled ? "None." : field && isDetermined() ? "Not computed yet." : "The field is not determined yet."));

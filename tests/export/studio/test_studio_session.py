@@ -269,6 +269,15 @@ def test_a_picture_is_traced_to_strokes_with_marks():
     assert np.abs(np.hypot(*(cuts[0] - [145.5, 35.5]).T) - 24).max() < 3
 
 
+def test_lines_of_a_picture_continue_across_junctions():
+    image, places = Image.new("RGB", (200, 200), "white"), (60, 100, 140)
+    for at in places:
+        ImageDraw.Draw(image).line([20, at, 180, at + 10], fill="black", width=4)
+        ImageDraw.Draw(image).line([at, 20, at, 180], fill="black", width=4)
+    strokes = [np.reshape(s["points"], (-1, 2)) for s in open_drawing(png(image), "a.png")["strokes"]]
+    assert sorted(np.ptp(points, axis=0).max() > 150 for points in strokes) == [True] * 6
+
+
 def test_a_red_speck_of_a_picture_makes_no_black_line_a_cut():
     image = Image.new("RGB", (200, 160), "white")
     ImageDraw.Draw(image).line([20, 80, 180, 80], fill="black", width=3)
