@@ -210,7 +210,7 @@ def _sizes_of_models(document: dict[str, Any]) -> dict[str, int]:
 
 
 def show_surface(surface: Surface, facts: dict[str, Any], folder: Path) -> None:
-    """Print the fit of a surface, its undetermined parts, doubts about it, and the folder of its files.
+    """Print the fit of a surface, its undetermined parts, and the folder of its files.
 
     facts: its report.
     """

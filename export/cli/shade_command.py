@@ -40,8 +40,8 @@ def shade_command(
 
     Crosses do not determine which parts are bumps and which are hollows (--flip, --concave), nor the depth
     of parts that bend in one direction only (--hint). What is drawn, what is guessed, where crosses do not
-    fit, what is undetermined, and doubts are printed and written to surface.json. A surface without doubts
-    can be wrong too, most of all far from strokes.
+    fit, and what is undetermined are printed and written to surface.json. A surface can be wrong without a
+    warning, most of all far from strokes.
     """
     from ...models.surface.lift import surface
     from ...models.written_files import check_targets

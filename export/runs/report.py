@@ -89,7 +89,7 @@ class Report:
 
     @property
     def shaded(self) -> bool:
-        """Whether there is no doubt about the surface, which is therefore drawn."""
+        """Whether there is a surface that has settled, which is therefore drawn."""
         return self.surface is not None and not self.surface.doubts
 
     def facts(self, candidate: Candidate) -> dict[str, Any]:

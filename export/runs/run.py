@@ -90,8 +90,7 @@ def run(
     - DIR/solve: input and output of the local solvers
     - DIR/field.npz, .json, .rawfield with .obj and .sings: the kept field
     - DIR/overview.png and other pictures of it; overlay.svg, .png: the same on the drawing
-    - DIR/normals.png, shaded.png: its surface on the page of the drawing, without doubts; otherwise
-      report.json has the reasons
+    - DIR/normals.png, shaded.png: its surface on the page of the drawing, unless time was over
     - DIR/lowest.npz: the field of minimum 2-norm energy
     - DIR/mask.png: the mask, as `read_sketch` accepts it; not for an instance from a file
     - DIR/certificate.npz: the certificate of the proven bound, with the field of the method `prove`
@@ -388,7 +387,7 @@ def draw_pictures(
 
 
 def lift_and_draw(kept: CrossField, folder: Path, underlay: Underlay | None) -> Surface:
-    """Lift a field to a surface, and draw that if nothing speaks against it; for a child process."""
+    """Lift a field to a surface, and draw that unless time was over; for a child process."""
     deadline = Deadline.after(LONGEST_LIFT)
     lifted = surface(kept, stop=lambda: deadline.passed() or is_stopped())
     if not lifted.doubts:

@@ -43,7 +43,7 @@ FILES: Final = {
     "surface.obj": "mesh with texture coordinates and normals",
     MATERIALS: "its material",
     DRAWING: "the strokes on paper, its texture",
-    REPORT: "where the pictures lie, what supports the surface, doubts and freedom",
+    REPORT: "where the pictures lie, what supports the surface, and what is open",
 }
 """The files of a surface, and the content of each."""
 _PAPER: Final = (0.93, 0.91, 0.88)
@@ -231,7 +231,7 @@ def surface_document(surface: Surface, view: View, about: Mapping[str, Any] | No
 
 
 def surface_facts(surface: Surface) -> dict[str, Any]:
-    """Doubts about a surface, its support and freedom, and measurements in pixels and degrees."""
+    """The support of a surface, what is open, and measurements in pixels and degrees."""
     off = np.degrees(right_angle_deviation(surface.field, surface.heights))
     slant = np.degrees(np.arccos(np.clip(surface.normals[:, 2], -1.0, 1.0)))
     numbers = {

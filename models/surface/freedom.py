@@ -2,29 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
-from scipy import ndimage, sparse
-from scipy.sparse.linalg import ArpackError, eigsh
+from scipy import ndimage
 
+from ..instance.angles import HALF
 from ..instance.domain import Bools, Floats
 from ..instance.instance import Instance
-from ..instance.least_squares import Residuals
-from .equations import Equations, Weights, changes_of_normals, normals_of
+from .equations import normals_of
 from .hints import Hint
-from .stencils import GridLevel, scale_rows
+from .stencils import GridLevel
 
-SOFT: Final = 0.016  # change of the cosine of crosses per radian of normals (rms) below which depth is open
-_WHOLE: Final = 0.5  # least share of the part in which normals change
-_LOCAL: Final = 3e-4  # weight of uneven changes of normals, which rules out those of single pixels
-_TWIST: Final = 1e-4  # weight of what slopes do not determine
-_PULL: Final = 1e-7  # weight of heights, whose mean is free
-_MODES: Final = 4  # changes that are looked at, softest first
+_STRAIGHT: Final = np.radians(4.5)  # turn of the straighter line of most crosses below which depth is open
+_MOST: Final = 2 / 3  # of the crosses
+_SPAN: Final = 0.15  # of the longer side, to either side of a cross, over which its lines turn
+_KNOWN: Final = 0.1  # least share of the pixels from which both ends of both lines lie inside
 LARGE: Final = 0.05  # share of the mask from which the choices of a part are named
-_TURN: Final = np.tan(np.radians(20))  # between the normal of a hint that is shown and that of the surface
+_TURN: Final = np.radians(20)  # between the normal of a hint that is shown and that of the surface
 
 
 @dataclass(frozen=True)
@@ -38,7 +34,7 @@ class Freedom:
     part, pixels
         Number of the part of the mask, from 1 in reading order, and the number of its pixels.
     place
-        Coordinates (x, y) in the drawing: deep inside the part, or where the normals differ most.
+        Coordinates (x, y) in the drawing: deep inside the part, or where it is steep there.
     hint
         The normal of another surface with the same crosses at the place; None for a side.
 
@@ -55,7 +51,7 @@ class Freedom:
         x, y = self.place
         if self.kind == "side":
             return f"the part at ({x:g}, {y:g}) has the same crosses inside out"
-        return f"flatter and deeper surfaces have the same crosses, and differ most at ({x:g}, {y:g})"
+        return f"one family of lines is straight: flatter and deeper surfaces fit too, as at ({x:g}, {y:g})"
 
     @property
     def option(self) -> str:
@@ -83,46 +79,41 @@ def place_of(instance: Instance, row: int, column: int) -> tuple[float, float]:
     return float(f"{x:.4g}"), float(f"{y:.4g}")
 
 
-def find_open_depth(level: GridLevel, z: Floats, extra: Sequence[Residuals]) -> Hint | None:
-    """Another normal where normals change most, if a change of the whole part hardly changes the misfit.
+def find_open_depth(level: GridLevel, z: Floats) -> Hint | None:
+    """Another normal where the surface is steep, if one line of most crosses goes straight on.
 
-    The changes of heights with the least misfit per change of normals are eigenvectors of the linearised
-    equations, without the terms that decide only what crosses leave open. extra: as for `Equations`.
+    Cylinders, cones and other surfaces with straight rulings have flatter and deeper ones with the same
+    crosses. The misfit of such changes does not show it: errors of drawn crosses make it large.
     """
-    stencils = level.stencils
-    if stencils.count <= 2 * _MODES:
+    angles = [np.arctan2(*line.T[::-1]) for line in level.crosses.lines]
+    turns = np.stack([_turns(level, np.stack(angles), angle) for angle in angles])
+    turns = turns.min(axis=0)[np.isfinite(turns).all(axis=0)]
+    if len(turns) < _KNOWN * level.grid.size or np.quantile(turns, _MOST) > _STRAIGHT:
         return None
-    _, misfit = Equations(stencils, level.crosses, Weights(even=0.0, facing=0.0), extra).model(z)
-    changes = [
-        sum(scale_rows(slope, by) for slope, by in zip(stencils.slopes, part, strict=True))
-        for part in changes_of_normals(stencils, z)
-    ]
-    uneven = sum(change.T @ (stencils.unevenness @ change) for change in changes)
-    fixed = _TWIST * stencils.twist.T @ stencils.twist + _PULL * sparse.eye_array(stencils.count)
-    square = sum(change.T @ change for change in changes)
-    start = np.ones(stencils.count)
-    try:
-        gain, modes = eigsh(square, _MODES, (misfit + _LOCAL * uneven + fixed).tocsc(), v0=start)
-    except ArpackError:
-        return None  # as for equations without a distinct softest change
-    for mode in modes.T[gain >= SOFT**-2][::-1]:
-        turn = np.stack([change @ mode for change in changes])
-        size = np.sum(turn**2, axis=0)
-        if size.sum() ** 2 >= _WHOLE * len(size) * np.sum(size**2):
-            return _turned_hint(level, normals_of(stencils, z), turn)
-    return None
-
-
-def _turned_hint(level: GridLevel, normals: Floats, turn: Floats) -> Hint:
-    """The normal turned in the direction (3, n) where it is longest, away from the border, to the viewer."""
-    grid, size = level.grid, np.linalg.norm(turn, axis=0)
+    grid, (x, y, toward) = level.grid, normals_of(level.stencils, z)
     depth = _depth(grid.mask)[grid.mask]
-    at = int(np.argmax(np.where(depth >= depth.max() / 2, size, 0.0)))
-    step = turn[:, at] / size[at]
-    x, y, z = normals[:, at] + _TURN * (step if step[2] >= 0 else -step)
-    row, column = np.add(level.corner, np.array([grid.rows[at], grid.columns[at]]) << level.halved)
-    slant, tilt = np.degrees([np.arctan2(np.hypot(x, y), z), np.arctan2(y, x)]).round() % 360
+    at = int(np.argmin(np.where(depth >= depth.max() / 2, toward, 1.0)))
+    slant, tilt = np.arccos(toward[at]), np.arctan2(y[at], x[at])
+    slant, tilt = np.degrees([slant - _TURN if slant > 1.5 * _TURN else slant + _TURN, tilt]).round() % 360
+    row, column = np.add(level.corner, (grid.rows[at], grid.columns[at]))
     return Hint(int(row), int(column), float(np.radians(slant)), float(np.radians(tilt)))
+
+
+def _turns(level: GridLevel, angles: Floats, angle: Floats) -> Floats:
+    """How much the lines of the crosses turn along a line of each, from one end to the other; (n,).
+
+    angles: of both lines, (2, n). angle: of the line that is followed. Infinite where it leaves the mask.
+    """
+    grid, turns, known = level.grid, [], np.ones(level.grid.size, dtype=bool)
+    step = _SPAN * max(grid.mask.shape) * np.stack([-np.sin(angle), np.cos(angle)])
+    number = np.pad(grid.number, int(np.abs(step).max(initial=0)) + 1, constant_values=-1)
+    middle = np.stack([grid.rows, grid.columns]) + (number.shape[0] - grid.height) // 2
+    for place in (middle + step, middle - step):
+        pixel = number[tuple(np.rint(place).astype(int))]
+        turn = (angles[:, pixel] - angle + HALF) % np.pi - HALF
+        turns.append(np.where(np.abs(turn[0]) < np.abs(turn[1]), *turn))
+        known &= pixel >= 0
+    return np.where(known, np.abs(turns[0] - turns[1]), np.inf)
 
 
 def _depth(inside: Bools) -> Floats:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 from operator import itemgetter
 from typing import Final
 
@@ -21,7 +20,7 @@ from .freedom import LARGE, Freedom, find_deepest, find_open_depth, place_of
 from .hints import Hint, check_hints, find_pixels, hint_rows
 from .stencils import Crosses, GridLevel, Stencils, levels_of
 from .surface import Surface
-from .trust import confidence_of, doubts_of, right_angle_deviation
+from .trust import confidence_of, right_angle_deviation
 
 FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
 WEIGHTS: Final = Weights(even=1e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
@@ -71,7 +70,7 @@ def surface(
     Returns
     -------
     Surface
-        The surface, with its doubts.
+        The surface, with the choices that crosses leave open.
 
     Raises
     ------
@@ -94,41 +93,32 @@ def surface(
         level = GridLevel(stencils, crosses, (window[0].start, window[1].start))
         part_hints = [hint for hint in all_hints if part_of[hint.row, hint.column] == number]
         is_bowl = any(part_of[bowl] == number for bowl in bowls)
-        z, another = _solve_part(level, part_hints, is_over, flip=flip or is_bowl)
+        z = _solve_part(level, part_hints, is_over, flip=flip or is_bowl)
         used, (top, left) = level.stencils.used, level.corner
         heights[top : top + used.shape[0], left : left + used.shape[1]][used] = z - z.mean()
         if level.grid.size >= LARGE * instance.grid.size:
             if not (is_bowl or _decide_side(part_hints)):
                 middle = place_of(instance, *find_deepest(part_of == number))
                 freedom.append(Freedom("side", number, level.grid.size, middle))
-            if another and part_of[another.row, another.column] == number:
+            another = None if part_hints else find_open_depth(level, z)
+            if another:
                 place = place_of(instance, another.row, another.column)
                 freedom.append(Freedom("depth", number, level.grid.size, place, another))
-    off = right_angle_deviation(field, heights)
-    lifted = Surface(field, heights, confidence_of(field, off), (), tuple(freedom))
-    slant = np.arccos(np.minimum(lifted.normals[:, 2], 1.0))
     late = ("time was over before it had settled",) if is_over() else ()
-    return replace(lifted, doubts=(*doubts_of(off, slant), *late))
+    trust = confidence_of(field, right_angle_deviation(field, heights))
+    return Surface(field, heights, trust, late, tuple(freedom))
 
 
-def _solve_part(
-    part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool
-) -> tuple[Floats, Hint | None]:
-    """The minimum-energy heights, and a normal of another surface with the same crosses if there is one.
-
-    All starts are solved on the coarsest level, and the lowest one on all finer ones.
-    """
+def _solve_part(part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool) -> Floats:
+    """The minimum-energy heights: all starts are solved on the coarsest level, the best on all finer ones."""
     coarsest, *finer = levels_of(part)
     dome, *planes = ([*_from_start(coarsest, z, hints, is_over, flip=flip)] for z in coarsest.initial_heights)
     candidates = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
-    _, lowest = min(candidates, key=itemgetter(0))
-    z, coarse = lowest, coarsest
+    (_, z), coarse = min(candidates, key=itemgetter(0)), coarsest
     for level in finer:
         z = _descend_with_hints(level, level.interpolate(coarse, z), hints, is_over)[1]
         coarse = level
-    oriented = z if hints else _orient(part, z, flip=flip)
-    sided = lowest if oriented is z else -lowest  # else its hint would belong to the other side
-    return oriented, find_open_depth(coarsest, sided, [hint_rows(hint, coarsest) for hint in hints])
+    return z if hints else _orient(part, z, flip=flip)
 
 
 def _from_start(

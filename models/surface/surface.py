@@ -16,7 +16,7 @@ from .freedom import Freedom
 
 @dataclass(frozen=True, eq=False)
 class Surface(Pictured):
-    """Heights that a cross field was lifted to, with doubts about them.
+    """Heights that a cross field was lifted to.
 
     Parameters
     ----------
@@ -29,8 +29,7 @@ class Surface(Pictured):
         How well the equations hold at each pixel, float (n,) in [0, 1]. It does not measure the distance from
         the intended surface.
     doubts
-        Sentences with reasons not to trust the surface. Without any, one surface fits the crosses, which may
-        still be wrong between strokes.
+        A sentence if time was over before the heights had settled. A surface without one can be wrong too.
     freedom
         Choices that the crosses leave open, with the option that decides each. Flatter and deeper surfaces
         often fit too where none is named.

@@ -15,9 +15,6 @@ from .freedom import find_deepest, place_of
 from .stencils import Crosses, Stencils, corners_of_blocks
 
 OFF: Final = np.radians(10)  # lines whose angle in space deviates more from a right angle do not fit
-UNFIT: Final = 0.3  # share of misfit crosses from which a surface is doubted (docs/surface.md)
-_FLAT: Final = np.radians(10)  # mean slant below which a surface is called flat
-
 _PLAIN: Final = Weights(even=0.0, facing=0.0)
 
 
@@ -35,19 +32,6 @@ def confidence_of(field: CrossField, off: Floats) -> Floats:
     for quad in corners_of_blocks(singular):
         quad[spots.row, spots.column] = True
     return np.where(singular[field.instance.mask], 0.0, 1 / (1 + (off / OFF) ** 2))
-
-
-def doubts_of(off: Floats, slant: Floats) -> tuple[str, ...]:
-    """Sentences with reasons not to trust a surface. slant: of its normals, radians (n,)."""
-    unfit = float(np.mean(off > OFF))
-    conditions = {
-        f"{unfit:.0%} of the crosses are more than {np.degrees(OFF):g} degrees off right angles on it: "
-        "no one surface has all these curvature lines. Lines are missing, or some strokes are not curvature "
-        "lines or are hidden": unfit > UNFIT,
-        f"it is nearly flat, {np.degrees(slant.mean()):.1f} degrees on average: "
-        "lines that cross at right angles everywhere do not determine a shape": slant.mean() < _FLAT,
-    }
-    return tuple(doubt for doubt, holds in conditions.items() if holds)
 
 
 def describe_support(field: CrossField, off: Floats) -> dict[str, str]:
