@@ -33,8 +33,8 @@ SIZE: Final = 48
 WRONG: Final = 15.0
 """Mean error of the normals, in degrees, above which a surface counts as wrong."""
 SEED: Final = 1
-DOUBTS: Final = {"unfit": "right angles on it", "nearly flat": "nearly flat"}
-"""Words of each doubt about a surface."""
+FLAT: Final = 0.1
+"""Median ratio of principal curvatures below which rulings are straight, so that the depth is open."""
 COLOURS: Final = {"line": "#d0202a", "cut": "#111", "axis": "#9ab"}
 SIDE: Final = 900
 """Pixels of the longer side of a scan."""
@@ -51,7 +51,7 @@ class Stroke:
 
 @dataclass(frozen=True)
 class Case:
-    """A file with a drawing of a known surface. samples: x, y and normal (k, 5)."""
+    """A file with a drawing of a known surface. samples: x, y and normal (k, 5). is_open: its depth is."""
 
     drawing: str
     variant: str
@@ -60,6 +60,7 @@ class Case:
     data: bytes
     strokes: list[Stroke]
     samples: Floats
+    is_open: bool = False
 
 
 def read_strokes(path: Path) -> tuple[list[float], list[Stroke]]:
@@ -166,6 +167,11 @@ class Curvature:
         cosine = np.abs(np.einsum("ka,kab,kbc->kc", run, first, directions)).max(axis=1) / length
         return float(np.median(np.degrees(np.arccos(np.minimum(cosine, 1)))))
 
+    def has_straight_rulings(self) -> bool:
+        """Whether one principal curvature is small, so that the lines leave the depth open."""
+        sizes = np.sort(np.abs(self.at(self.samples[self.samples[:, 4] > 0.4, :2][::4])[1]), axis=1)
+        return bool(np.median(sizes[:, 0] / sizes[:, 1]) < FLAT)
+
     def stray(self, rng: np.random.Generator, *, straight: bool) -> Floats | None:
         """A straight stroke, or one half-way between both families, far from curvature lines and long.
 
@@ -209,12 +215,21 @@ def cases(folder: Path) -> Iterator[Case]:
     ):
         samples, rng = np.array(truth["normals"]), np.random.default_rng([SEED, number])
         page, strokes = read_strokes(folder / f"{name}.clean.svg")
-        rough = folder / f"{name}.rough_axes.svg"
-        yield Case(
+        rough, curvature = folder / f"{name}.rough_axes.svg", Curvature(samples, max(page[2:]))
+        drawn = Case(
             name, "rough with axes", 0, rough.name, rough.read_bytes(), read_strokes(rough)[1], samples
         )
-        for case in variants(page, strokes, Curvature(samples, max(page[2:])), rng):
-            drawn = replace(case, drawing=name, data=draw_svg(page, case.strokes), samples=samples)
+        drawn = replace(drawn, is_open=curvature.has_straight_rulings())
+        yield drawn
+        for case in variants(page, strokes, curvature, rng):
+            drawn = replace(
+                drawn,
+                variant=case.variant,
+                seed=case.seed,
+                file=case.file,
+                data=draw_svg(page, case.strokes),
+                strokes=case.strokes,
+            )
             yield drawn
             if case.variant in {"clean", "rough", "stray line"} and case.seed == 0:
                 yield scan(drawn, page, rng)
@@ -261,7 +276,7 @@ def match_strokes(case: Case, document: Document) -> list[int]:
 
 
 def measure(case: Case) -> dict[str, Any]:
-    """The error of the surface of a case, and what the studio doubts."""
+    """The error of the surface of a case, and what the studio says of it."""
     opened = open_drawing(case.data, case.file)
     content = {name: opened[name] for name in ("name", "page", "strokes", "source")}
     content |= {"format": FORMAT, "version": VERSION, "size": SIZE}
@@ -275,6 +290,7 @@ def measure(case: Case) -> dict[str, Any]:
     sides = [mean_angle(normals * side, true) for side in ((1, 1, 1), (-1, -1, 1))]
     drawn_at = match_strokes(case, document)
     suspects = [case.strokes[number].wrong for number in {drawn_at[number] for number in seen["suspects"]}]
+    is_named = any(choice["kind"] == "depth" for choice in seen["freedom"])
     return {
         "drawing": case.drawing,
         "variant": case.variant,
@@ -282,34 +298,45 @@ def measure(case: Case) -> dict[str, Any]:
         "mean error": f"{min(sides):.1f}",
         "inside out": int(sides[1] < sides[0]),
         "misfit": f"{np.mean(right_angle_deviation(field, lifted.heights) > OFF):.2f}",
-        **{name: int(any(words in doubt for doubt in seen["doubts"])) for name, words in DOUBTS.items()},
+        "depth is open": int(case.is_open),
+        "open depth": int(is_named),
         "wrong lines": sum(stroke.wrong is True for stroke in case.strokes),
         "suspected": len(suspects) - suspects.count(None),
         "rightly suspected": suspects.count(True),
+        "warned": int(is_named or bool(seen["suspects"])),
     }
 
 
 def summarise(rows: list[dict[str, Any]]) -> Iterator[list[str]]:
-    """Doubts, their precision and recall: for drawings in two halves, for scans, and for drawings begun."""
+    """Statements, their precision and recall: for drawings in two halves, scans, and drawings begun."""
     names = sorted({row["drawing"] for row in rows})
     halves = {name: f"{half[0]} to {half[-1]}" for half in (names[:6], names[6:]) for name in half}
     sets: dict[str, list[dict[str, Any]]] = {title: [] for title in (*halves.values(), "scanned", "begun")}
     for row in rows:
         kinds = [kind for kind in ("scanned", "begun") if kind in row["variant"]]
         sets[kinds[0] if kinds else halves[row["drawing"]]].append(row)
-    for title, chosen in sets.items():
-        wrong = [row for row in chosen if float(row["mean error"]) > WRONG]
-        lines = sum(row["wrong lines"] for row in chosen)
-        cells = [
-            describe(sum(row[doubt] for row in chosen), sum(row[doubt] for row in wrong), len(wrong))
-            for doubt in DOUBTS
+    for title, chosen in {
+        **sets,
+        "all but begun": [row for row in rows if row["variant"] != "begun"],
+    }.items():
+        lines, rightly = (sum(row[head] for row in chosen) for head in ("wrong lines", "rightly suspected"))
+        wrong = [float(row["mean error"]) > WRONG for row in chosen]
+        is_open, named, warned = (
+            [row[head] for row in chosen] for head in ("depth is open", "open depth", "warned")
+        )
+        yield [
+            f"{title} ({len(chosen)})",
+            str(lines),
+            describe(sum(row["suspected"] for row in chosen), rightly, lines),
+            str(sum(is_open)),
+            describe(sum(named), int(np.dot(is_open, named)), sum(is_open)),
+            str(sum(wrong)),
+            describe(sum(warned), int(np.dot(wrong, warned)), sum(wrong)),
         ]
-        suspected = [sum(row[head] for row in chosen) for head in ("suspected", "rightly suspected")]
-        yield [title, f"{len(wrong)} of {len(chosen)}", *cells, str(lines), describe(*suspected, lines)]
 
 
 def describe(doubted: int, right: int, wrong: int) -> str:
-    """A number of doubts, their precision and recall."""
+    """A number of statements, their precision and recall."""
     return ", ".join(
         [str(doubted), *(f"{right / count:.2f}" if count else "-" for count in (doubted, wrong))]
     )
@@ -325,5 +352,5 @@ def main(page: Path, arguments: Sequence[str]) -> None:
         rows.append(measure(case))
         print(*rows[-1].values(), flush=True)
     write_rows("surface/doubts.csv", rows)
-    heads = ("drawings", "wrong surfaces", *DOUBTS, "wrong lines", "suspected")
+    heads = ("drawings", "wrong lines", "suspected", "open depths", "named", "wrong surfaces", "warned")
     replace_between(page.with_name("surface.md"), "doubts", markdown(heads, list(summarise(rows))))
