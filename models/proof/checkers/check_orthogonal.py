@@ -42,6 +42,10 @@ MOST_DENSE = 6000  # points up to which limits are computed; beyond, they are pi
 COLUMNS = 64  # of an inverse, at once
 LONGEST_WALK, MOST_SWEEPS = 100, 20  # steps of a walk; turns of both signs
 MOST_STAGES = 64  # of charges
+MOST_BRANCHED = 2000  # loops, and particles, of branches
+MOST_SHARES = 1 << 23  # of all branches together
+BRANCHES_AT_ONCE = 1000
+WHOLE = (1 << 16) - 1  # a share of 1
 LINKS_AT_ONCE = 1 << 19  # of links from their clouds at once
 MOST_CASES = 256  # of integers after the last level
 FARTHEST_CENTRE = 1e3  # of a centre and of the angles of a case
@@ -64,6 +68,7 @@ STAGE_PARTS = {  # of charges, with their kinds; the first four have a number fo
     "positive": "|u1", "negative": "|u1", "potential": "<f8", "price": "<f8",
     "start": "<i4", "loop": "<i4", "weight": "<f4",
 }  # fmt: skip
+BRANCHES = ("branches", "branch_particles", "branch_shares")  # also, or none of them
 LEVEL_PARTS = ("rings", "shares", "unit", "squares")
 
 Array = Any
@@ -85,7 +90,7 @@ class CentredRows:
     less than here, because kappa differs from that of the mesh. memory, taken: most bytes for the check, and
     those that it takes without levels.
 
-    Prescribed indices (Lemma 11) add `constant` to the energy, and shift residuals by shift (r,) on the rows
+    Prescribed indices (Lemma 12) add `constant` to the energy, and shift residuals by shift (r,) on the rows
     of their rings, where is_held (r,) is True. steps (3, t): ring, row and direction along these rings. turns
     (k,): the sums of integers there.
     """
@@ -129,7 +134,7 @@ class CentredRows:
         self.residual = self.residuals(self.centre) + HALF * self.nearest
 
     def _shift_residuals(self, arrays: dict[str, Array]) -> tuple[Array, Array, float]:
-        """Lemma 11: which rows are held, by how much residuals are shifted, and the constant."""
+        """Lemma 12: which rows are held, by how much residuals are shifted, and the constant."""
         (ring, row, sign), size, count = self.steps, len(self.turns), len(self.offset)
         held = np.bincount(row, minlength=count) > 0
         if size == 0:
@@ -789,13 +794,144 @@ def stage_of(charges: Charges, clouds: Clouds, potential: Array, price: Array) -
     return bound, HALF**2 * added, kind
 
 
+class Branches:
+    """Bounds of energies where some particles are there and others are not (Lemma 11).
+
+    count (c,): particles of each kind. unit (u,): the kind of each, as of `stage_of`; sign (u,). smeared
+    (u, l): what its cloud makes of it, with its sign. alone (u,): what it adds without others or a potential,
+    at least. mutual (u, u): what one adds for another one that is there. never (u, u): whether no field has
+    both. inverse (l, l): of the Laplacian, about; bounds hold for any.
+    """
+
+    def __init__(self, charges: Charges, clouds: Clouds, count: Array) -> None:
+        """Prepare bounds for up to so many particles of each kind, count (c,)."""
+        size, kinds, rows = charges.size, len(clouds.loop), charges.rows
+        self.charges, self.count, number = charges, count, spans(0 * count, count)
+        self.unit = np.repeat(np.arange(kinds), count)
+        units = np.arange(len(self.unit))
+        fits = len(units) > 0 and max(size, len(units)) <= MOST_BRANCHED
+        base.require(fits, "branches", "have no particles or too many")
+        base.check_room(rows.taken + 8 * (size + len(units)) * (6 * size + 6 * len(units)), rows.memory)
+        self.margin = charges.margin + base.PRECISION * (size + len(units))
+        self.sign, self.loop = clouds.sign[self.unit], clouds.loop[self.unit]
+        line, self.laplacian = np.repeat(np.arange(size), np.diff(charges.begin)), np.diag(charges.resistance)
+        np.subtract.at(self.laplacian, (line, charges.column), charges.entry)
+        part = base.parts_of(size, *charges.links)
+        joined = (part[:, None] == part) * charges.resistance.mean() / size
+        self.inverse = np.linalg.inv(self.laplacian + joined)
+        weight = np.zeros((kinds, size))
+        weight[clouds.owner, clouds.cell] = clouds.weight
+        self.weight = weight[self.unit]
+        smeared, reach = -self.weight @ self.laplacian, self.weight @ np.abs(self.laplacian)
+        smeared[units, self.loop] += 1
+        reach[units, self.loop] += 1
+        near = self.weight[:, self.loop]
+        pairs = near + smeared @ self.weight.T - self.margin * (near + reach @ self.weight.T)
+        alike = (self.sign[:, None] == self.sign) & (self.unit[:, None] != self.unit)
+        pairs = np.where(alike, np.maximum(pairs, 0.0), 0.0)
+        self.never = (self.sign[:, None] != self.sign) & (self.loop[:, None] == self.loop)
+        self.mutual, self.smeared = pairs + pairs.T, self.sign[:, None] * smeared
+        self.pulled = 2 * self.margin * (1 + 2 * self.weight @ charges.resistance)
+        most = clouds.at_home + clouds.size + 2 * np.abs(charges.origin)[clouds.cell]
+        itself, error = (
+            np.bincount(clouds.owner, clouds.weight * numbers, kinds)[self.unit]
+            for numbers in (clouds.at_home + clouds.smeared, self.margin * most + 2 * charges.error)
+        )
+        self.alone = (itself - error) * (2 * number + 1)
+
+    def bounds(self, state: Array, shares: Array) -> Array:
+        """Lower bounds (b,). state (b, u): 1 for particles that are there, 0 for others, 2 for either.
+
+        shares (b, u): how much of the latter the charges have that make the potential.
+        """
+        there, free, origin = state == 1, state == 2, self.charges.origin
+        potential = (np.where(free, shares, there) @ self.smeared - origin) @ self.inverse
+        laplace, far = potential @ self.laplacian, np.abs(potential).max(axis=1)
+        pull = potential[:, self.loop] - (origin + laplace) @ self.weight.T
+        mutual = there @ self.mutual
+        added = self.alone + 2 * self.sign * pull - far[:, None] * self.pulled + mutual
+        price, fits = self._prices(self.sign * added, there, free)
+        fits &= ((there @ self.never) * there == 0).all(axis=1)
+        size = (np.abs(added) + mutual).sum(axis=1)
+        size += np.abs(price) * (len(self.unit) + len(origin) + np.abs(origin).sum())
+        highest = 2 + np.abs(origin).max() + 2 * self.charges.resistance.max() * far
+        size += np.abs(potential).sum(axis=1) * highest
+        added -= price[:, None] * self.sign
+        least = np.where(free, np.minimum(added, 0.0), there * (added - mutual / 2)).sum(axis=1)
+        least += price * origin.sum() - (potential * (2 * origin + laplace)).sum(axis=1)
+        bounds = least - (self.margin + 2 * self.charges.error) * size
+        base.require(np.isfinite(bounds), "branches", "have a bound that is no number")
+        return np.where(fits, HALF**2 * bounds + self.charges.rows.constant, np.inf)
+
+    def _prices(self, added: Array, there: Array, free: Array) -> tuple[Array, Array]:
+        """The best multipliers (b,) for the sum of all charges, where that is 0, and whether it may be.
+
+        added (b, u): what particles add, with their signs.
+        """
+        if not self.charges.closed.all():
+            return np.zeros(len(added)), np.ones(len(added), bool)
+        total = float(self.charges.origin.sum())
+        base.require(abs(total - round(total)) < 0.1, "loops", "have charges of another sum than 0")
+        wanted = round(total) - there @ self.sign
+        due, count = wanted + (free & (self.sign < 0)).sum(axis=1), free.sum(axis=1)
+        order = np.sort(np.where(free, added, np.inf), axis=1)
+        best = order[np.arange(len(added)), np.clip(due - 1, 0, np.maximum(count - 1, 0))]
+        return np.where(count > 0, best, 0.0), (due >= 0) & (due <= count)
+
+
+def states_of(tree: Array, units: int) -> Array:
+    """The states of the branches at the ends of a tree: for each node its particle, or -1 at an end.
+
+    Both subtrees follow it, first the one where the particle is there.
+    """
+    ends, open_ends = [], [np.full(units, 2, np.int8)]
+    for unit in tree.tolist():
+        base.require(len(open_ends) > 0, "branches", "go on after the end")
+        state = open_ends.pop()
+        if unit < 0:
+            ends.append(state)
+            continue
+        base.require(unit < units and state[unit] == 2, "branches", "divide by a particle twice")
+        without = state.copy()
+        state[unit], without[unit] = 1, 0
+        open_ends += [without, state]
+    base.require(len(ends) > 0 and not open_ends, "branches", "do not end")
+    return np.array(ends)
+
+
+def branches_bound(arrays: dict[str, Array], branches: Branches) -> float:
+    """The least bound of the branches in a certificate."""
+    tree, units = base.take_array(arrays, "branches", "<i4", None), len(branches.unit)
+    count = int((tree < 0).sum())
+    base.require(count * units <= MOST_SHARES, "branches", "are too many")
+    shares, least = base.take_array(arrays, "branch_shares", "<u2", count, units), math.inf
+    base.check_room(branches.charges.rows.taken + 16 * count * units, branches.charges.rows.memory)
+    states = states_of(tree, units)
+    for begin in range(0, count, BRANCHES_AT_ONCE):
+        part = slice(begin, begin + BRANCHES_AT_ONCE)
+        least = min(least, float(branches.bounds(states[part], shares[part] / WHOLE).min()))
+    return least
+
+
 def charges_bound(arrays: dict[str, Array], rows: CentredRows, threshold: float) -> float:
-    """The greatest bound of the stages of charges in a certificate; 0 without any.
+    """The greatest bound of the charges in a certificate; 0 without any."""
+    if "loop_start" not in arrays:
+        return 0.0
+    best, charges, clouds, count = stages_bound(arrays, rows, threshold)
+    if "branches" in arrays:
+        particles = base.take_array(arrays, "branch_particles", "|u1", len(count)).astype(np.int64)
+        base.require(particles >= count, "branch_particles", "leaves out a particle")
+        best = max(best, branches_bound(arrays, Branches(charges, clouds, particles)))
+    return best
+
+
+def stages_bound(
+    arrays: dict[str, Array], rows: CentredRows, threshold: float
+) -> tuple[float, Charges, Clouds, Array]:
+    """The greatest bound of stages, the charges, the last clouds, and how many particles of each are left.
 
     Each stage covers what the one before leaves to fields with an energy of at most the threshold.
     """
-    if "loop_start" not in arrays:
-        return 0.0
     charges, best = Charges(arrays, rows), 0.0
     remaining, links, size = charges.most, charges.links, charges.size
     for number in range(stage_count(arrays)):
@@ -813,7 +949,7 @@ def charges_bound(arrays: dict[str, Array], rows: CentredRows, threshold: float)
         clouds = Clouds(charges, most, start, cell, weight)
         bound, added, kind = stage_of(charges, clouds, potential, price)
         best, remaining = max(best, bound), clouds.remaining(bound, added, kind, threshold)
-    return best
+    return best, charges, clouds, remaining[(1 - clouds.sign) // 2, clouds.loop]
 
 
 def stage_count(arrays: dict[str, Array]) -> int:
@@ -885,6 +1021,7 @@ def check_names(arrays: dict[str, Array], levels: int) -> None:
     if "loop_start" in arrays:
         stages = range(stage_count(arrays))
         more |= {*LOOPS} | {f"stage_{number}_{part}" for number in stages for part in STAGE_PARTS}
+        more |= {*BRANCHES} if "branches" in arrays else set()
     base.compare_names(arrays, {*PARTS, *of_domain, *more}, LEVEL_PARTS, levels)
 
 

@@ -3,18 +3,19 @@
 docs/orthogonal-proofs.md has the lemmas. On every level a dual rises (orthogonal_dual.py), a field is rounded
 from it, and the checker (check_orthogonal.py) computes the bound and what is left. The next level has a third
 of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters. Where
-many points have no stroke, charges (charges.py) give a first bound.
+many points have no stroke, charges (charges.py) and branches on them (branches.py) give a first bound.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from ...array_archive import Arrays
@@ -29,6 +30,7 @@ from ...orthogonal.energy import OrthogonalEnergy, field_of
 from ...processes.deadline import Progress, never
 from ...search.integer_fields import starting_integers
 from ...search.integer_search import IntegerSearch
+from ..bound.branches import branch_arrays
 from ..bound.charges import charge_arrays
 from ..bound.orthogonal_dual import RingDual, update_rings
 from ..checkers import check_orthogonal as checker
@@ -59,6 +61,7 @@ _LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one, and
 _STARTS: Final = 0.3  # of the time, after which no start is rounded with care
 _CHARGES: Final = 0.5  # of the time, which charges leave
 _MANY_FREE: Final = 400  # points without strokes above which levels exclude little, and charges are tried
+_CLOSED: Final = 0.05  # relative gap of charges below which branches take the time of levels
 _LOOK: Final = 1e-4  # seconds per point of a first look at charges, and of its check, where points are many
 _PULL: Final = 1e-9  # relative: makes the matrix of prescribed rings of a closed part definite
 _TUNING: Final = 0.1  # of the time, in which the multipliers of prescribed sums rise
@@ -222,6 +225,8 @@ class _Prover:
             is_over = (lambda: ends.is_over(ahead)) if many or not quick else never  # noqa: B023
             # One look shows whether a search pays first.
             arrays = charge_arrays(self.instance.domain, rows, chain.threshold, is_over, quick=quick)
+            if arrays and not quick:
+                arrays |= self._branch(arrays, rows, chain.threshold, ahead)
             checking = clock()
             bound = checker.charges_bound(arrays, rows, chain.threshold)
             self.charged = math.inf if quick and arrays else self.least
@@ -239,6 +244,28 @@ class _Prover:
                 self._search_if_due()
             quick = False
         return ""
+
+    def _branch(self, arrays: Arrays, rows: CentredRows, threshold: float, ahead: float) -> Arrays:
+        """The arrays of branches, and a better field if they show one. ahead: seconds for what follows."""
+        bound = checker.charges_bound(arrays, rows, threshold)
+        if self.least - bound <= OPTIMAL / 2 * max(1.0, self.least):
+            return {}
+        if self.least - bound < _CLOSED * self.least:  # no level proves as much
+            ahead = self.proven.seconds
+        branches, better = branch_arrays(
+            arrays, rows, threshold, lambda seconds: self.ends.is_over(ahead + seconds)
+        )
+        if better is not None and self.energy.sums is None:
+            self._offer_charges(arrays, better)
+        return branches
+
+    def _offer_charges(self, arrays: Arrays, charges: Floats) -> bool:
+        """Whether integers with these charges of loops are better than the best ones."""
+        parts = arrays["loop_sign"], arrays["loop_row"], arrays["loop_start"]
+        walks = csr_array(parts, shape=(len(charges), len(self.z)))
+        turns = np.round(charges - walks @ (self.energy.constant / HALF)).astype(np.int32)
+        z = replace(self.energy, sums=walks.tocsc(), turns_along=turns).with_sums(self.z)
+        return self._offer(self.energy.descend(z, is_over=self.ends.is_over))
 
     def _leave_out(self, what: str) -> None:
         """Add to the reason what is left out."""

@@ -47,12 +47,6 @@ def test_search_finds_what_all_integers_together_have_as_their_best(name):
     assert min(found.values()) >= least - 1e-8
 
 
-@pytest.mark.slow
-def test_search_finds_the_proven_optimum_of_a_torus_without_strokes():
-    field = cf.search(cf.sample("doughnut"), rounds=20).field
-    assert field.energy().total == pytest.approx(2.0605952, abs=1e-6)
-
-
 @pytest.mark.parametrize(
     "mesh, count, energy", [(tetrahedron(), 4, 0.0), (box(2), 8, 0.0), (icosahedron(), 8, None)]
 )
@@ -140,27 +134,6 @@ def test_patches_of_a_large_mesh_lower_the_energy(monkeypatch):
     assert totals == sorted(totals, reverse=True)
     assert totals[-1] < 0.5 * totals[0]
     assert field_of(instance, hunt.best.p, energy).energy().total == pytest.approx(totals[-1])
-
-
-def test_a_round_repeats_its_bits():
-    energy, rings = OrthogonalEnergy.of(small_torus()), small_torus().domain.rings
-    best = []
-    for _ in range(2):
-        hunt = IntegerSearch(energy, rings, [energy.nearest(np.zeros(energy.size))], 5)
-        hunt.explore(lambda: False)
-        best.append(hunt.best.p.tobytes())
-    assert best[0] == best[1]
-
-
-def test_the_integers_of_a_round_stay_while_the_search_goes_on():
-    instance = strokeless(torus(16, 8))
-    energy = OrthogonalEnergy.of(instance)
-    start = energy.nearest(np.random.default_rng(6).uniform(0, 1.5, energy.size))
-    hunt = IntegerSearch(energy, instance.domain.rings, [start], 6)
-    hunt.explore(lambda: False)
-    best, total = hunt.best.p, hunt.best.energy
-    hunt.explore(lambda: False)
-    assert energy.least_total(best) == pytest.approx(total, rel=1e-12)
 
 
 @pytest.mark.parametrize("seed, stretch", [(3, (1, 1, 1)), (5, (1, 1, 3))])

@@ -14,6 +14,7 @@ from certificate_arrays import with_head
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
 from crossfield.models.processes.deadline import Deadline, never, silent
 from crossfield.models.proof.bound import charges
+from crossfield.models.proof.bound.charges import charge_arrays
 from crossfield.models.proof.certificate import check_proof
 from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError
@@ -95,14 +96,18 @@ def bound_of_charges(arrays):
     return checker.charges_bound(arrays, checker.CentredRows(arrays), threshold)
 
 
+def matrix_of_loops(arrays, rows):
+    start = arrays["loop_start"]
+    matrix, loop = np.zeros((len(start) - 1, rows)), np.repeat(np.arange(len(start) - 1), np.diff(start))
+    matrix[loop, arrays["loop_row"]] = arrays["loop_sign"]
+    return matrix
+
+
 def admits_charges(arrays, instance, z):
     """Whether limits and walks exclude no charge of these integers at their best angles."""
     rows, angles = checker.CentredRows(arrays), OrthogonalEnergy.of(instance).fit_angles(z)
     residual, charges = rows.residuals(np.append(angles, 0.0)) + np.pi / 2 * z, checker.Charges(arrays, rows)
-    matrix = np.zeros((charges.size, len(residual)))
-    loop = np.repeat(np.arange(charges.size), np.diff(arrays["loop_start"]))
-    matrix[loop, arrays["loop_row"]] = arrays["loop_sign"]
-    particles = charges.origin + matrix @ residual / (np.pi / 2)
+    particles = charges.origin + matrix_of_loops(arrays, len(residual)) @ residual / (np.pi / 2)
     return ((particles < charges.most[0] + 0.5) & (particles > -charges.most[1] - 0.5)).all()
 
 
@@ -137,6 +142,34 @@ def test_charges_of_parts_strokes_and_weights_do_not_exceed_the_optimum(seed, ki
     assert (arrays["loop_row"] >= len(mesh.first)).any() == (kind in ("sheet", "edges"))
     assert bound_of_charges(arrays) <= optimum + 1e-9
     assert admits_charges(arrays, instance, z)
+
+
+@pytest.mark.parametrize("mesh", [random_hull(3, 10), random_hull(1, 6, (1, 1, 5)), torus_of_seven()])
+def test_no_branch_has_a_bound_above_the_energies_of_its_charges(mesh):
+    rng = np.random.default_rng(0)
+    instance = strokeless(mesh, pair_weights=rng.uniform(0.2, 5, len(mesh.first)))
+    z = np.zeros(len(mesh.first), np.int32)
+    rows = checker.CentredRows(prove_from(instance, z, levels=1).certificate())
+    arrays = charge_arrays(mesh, rows, 99.0, never)
+    _, charges, clouds, count = checker.stages_bound(arrays, rows, 99.0)
+    branches, walks = checker.Branches(charges, clouds, count), matrix_of_loops(arrays, len(rows.weight))
+    places = branches.sign[:, None] * np.eye(charges.size)[branches.loop]
+    there = np.array([*itertools.product((0, 1), repeat=len(places))])
+    sums, alone = there @ places - charges.origin, there @ np.abs(places) == np.abs(there @ places)
+    possible = (np.abs(sums.sum(axis=1)) < 0.1) & alone.all(axis=1)  # charges of a loop have one sign
+    there, sums, form = there[possible], sums[possible], np.linalg.pinv((walks / rows.weight) @ walks.T)
+    energies = np.pi**2 / 4 * np.einsum("kv,vw,kw->k", sums, form, sums, optimize=True)
+    states = rng.choice([0, 1, 2], p=[0.2, 0.2, 0.6], size=(300, len(places)))
+    bounds = branches.bounds(states, rng.random(states.shape))
+    members = ((states[:, None] == there) | (states[:, None] == 2)).all(axis=2)
+    assert (bounds <= np.where(members, energies, np.inf).min(axis=1) + 1e-9).all()
+    assert members.any(axis=1).sum() > 50
+
+
+@pytest.mark.parametrize("points", [10, 20, 40])
+def test_branches_prove_optima_of_closed_surfaces(points):
+    proof = cf.prove(strokeless(random_hull(points, points)), jobs=1)
+    assert (proof.status, proof.levels, "branches" in proof.arrays) == ("optimal", (), True)
 
 
 def test_charges_do_not_exceed_the_optimum_of_a_torus():
@@ -200,7 +233,7 @@ def test_without_time_for_charges_and_levels_many_faces_have_a_field_and_the_rea
 def test_a_bound_of_charges_has_the_reason_why_no_level_follows(monkeypatch):
     monkeypatch.setattr(orthogonal, "_MOST_COSTS", 1000)
     ticks = []
-    proof = cf.prove(strokeless(torus(12, 6)), progress=ticks.append, stop=lambda: len(ticks) > 3)
+    proof = cf.prove(strokeless(torus_of_seven()), progress=ticks.append, stop=lambda: len(ticks) > 3)
     assert 0 < proof.bound < proof.energy
     assert proof.reason.startswith("the coarsest level has")
 

@@ -13,7 +13,7 @@ from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError
 from meshes import torus
 from orthogonal_certificates import certificate_at, shares_of_star, star
-from small_meshes import fan, random_instance, strokeless, try_all_integers
+from small_meshes import fan, random_hull, random_instance, strokeless, try_all_integers
 
 HALF = np.pi / 2
 BOTH = ([1, 1], [1, -1])  # one pair, there and back
@@ -275,9 +275,35 @@ BROKEN_CHARGES = [
 """As `BROKEN`, of a closed surface."""
 
 
-def test_each_broken_assumption_about_charges_is_refused_by_name(subtests):
-    sound = cf.prove(strokeless(torus(12, 6)), limits=cf.Limits(gap=0.9)).certificate()
+def with_tree(first, end=None):
+    """A change of the tree of branches: other nodes before those from some place on."""
+
+    def change(arrays):
+        tree = np.append(first, arrays["branches"])[:end].astype("i4")
+        shares = np.resize(arrays["branch_shares"], ((tree < 0).sum(), arrays["branch_shares"].shape[1]))
+        return arrays | {"branches": tree, "branch_shares": shares}
+
+    return change
+
+
+BROKEN_BRANCHES = [
+    ("go on after the end", with_tree([-1])),
+    ("do not end", with_tree([], -1)),
+    ("by a particle twice", with_tree([1, 1])),
+    ("by a particle twice", with_tree([99])),
+    ("branch_particles leaves out", lambda a: a | {"branch_particles": 0 * a["branch_particles"]}),
+    ("branch_shares", lambda a: a | {"branch_shares": a["branch_shares"][:, 1:]}),
+    ("branch_shares", lambda a: {name: array for name, array in a.items() if name != "branch_shares"}),
+]
+"""As `BROKEN`, of branches."""
+
+
+@pytest.mark.parametrize(
+    "mesh, gap, broken", [(torus(12, 6), 0.9, BROKEN_CHARGES), (random_hull(1, 20), 0.0, BROKEN_BRANCHES)]
+)
+def test_each_broken_assumption_about_charges_is_refused_by_name(mesh, gap, broken, subtests):
+    sound = cf.prove(strokeless(mesh), limits=cf.Limits(gap=gap), jobs=1).certificate()
     assert checker.check_arrays(sound).bound > 0
-    for number, (message, change) in enumerate(BROKEN_CHARGES):
+    for number, (message, change) in enumerate(broken):
         with subtests.test(message, number=number):
             assert message in re.sub(r"\[\d+\]", "", refusal(change(sound)))

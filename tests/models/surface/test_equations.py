@@ -1,13 +1,11 @@
-"""The way down the energy of heights, and planes on levels of grids."""
-
-import itertools
+"""The way down the energy of heights."""
 
 import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.processes.deadline import never
 from crossfield.models.surface.equations import Equations, Weights, descend
-from crossfield.models.surface.stencils import Crosses, GridLevel, Stencils, levels_of
+from crossfield.models.surface.stencils import Crosses, Stencils
 
 
 def equations():
@@ -35,19 +33,3 @@ def test_the_way_down_ends_where_the_slope_does_and_time_cuts_it_short():
     again, _ = descend(system, low, never)
     assert again == pytest.approx(energies[-1], rel=1e-2)
     assert again <= energies[-1]
-
-
-def test_a_plane_stays_a_plane_on_finer_levels():
-    mask = np.ones((33, 30), dtype=bool)
-    mask[:9, :13] = False
-    grid = cf.Instance.on_pixels("bit", mask, np.argwhere(mask)[:1], np.zeros(1), np.ones(1)).grid
-    cross = np.full(grid.size, 1.0 + 0j)
-    levels = levels_of(GridLevel(Stencils(grid), Crosses(-cross, 0 * cross)))
-    assert [level.halved for level in levels] == [1, 0]
-    assert all((level.crosses.product == -1).all() for level in levels)
-    for coarse, fine in itertools.pairwise(levels):
-        planes = []
-        for level in (coarse, fine):
-            row, column = np.nonzero(level.stencils.used)
-            planes.append((0.3 * row - 0.2 * column) * 1.0)
-        assert fine.interpolate(coarse, planes[0]) == pytest.approx(planes[1])
