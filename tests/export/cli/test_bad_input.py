@@ -200,7 +200,7 @@ def test_a_run_without_solvers_still_computes_a_field(tmp_path, files, instance)
     assert {row["method"] for row in report["methods"]} - {"prove"} == {  # for which the time may not suffice
         "start", "greedy", "power", "power + QP", "polyvector", "polyvector + QP", "bend", "search",
     }  # fmt: skip
-    assert set(report["failures"]) == {"two-stage"}
+    assert set(report["failures"]) - {"certificate"} == {"two-stage"}  # likewise
     assert all("is not installed" in reason for reason in report["failures"].values())
     assert cf.read_field(tmp_path / "out" / "field.npz").instance.sha256 == instance.sha256
 
