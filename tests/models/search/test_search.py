@@ -73,6 +73,13 @@ def test_a_start_in_the_other_gauge_is_taken():
     assert cf.search(other, rounds=0, jobs=1, start=start).field.instance is other
 
 
+def test_a_search_that_ends_at_once_is_no_worse_than_its_start():
+    best = cf.search(cf.sample("mouse", 12), rounds=0, jobs=1).field
+    ways = [cf.search(best.instance, jobs=1, start=start, stop=lambda: True) for start in (None, best)]
+    alone, ended = (way.field.energy().total for way in ways)
+    assert ended <= best.energy().total + 1e-9 < alone
+
+
 @pytest.mark.slow
 def test_a_small_grid_is_searched_from_several_starts():
     """From the lowest start alone, three rounds lead to an energy of 6.914."""
