@@ -91,6 +91,14 @@ class OrthogonalEnergy(RightAngles):
             np.add.at(lacking, np.where(forward, ends[1, row], ends[0, row]), lack)
         return z
 
+    def with_charges(self, z: Ints, walks: sparse.csr_array, charges: Floats) -> Ints:
+        """The integers (r,) next to z (r,) that give closed walks these charges (k,), in quarter turns.
+
+        walks (k, r): signs of the rows along them.
+        """
+        turns = np.round(charges - walks @ (self.constant / HALF)).astype(np.int32)
+        return replace(self, sums=walks.tocsc(), turns_along=turns).with_sums(z)
+
     @cached_property
     def _ways(self) -> tuple[Ints, Forest]:
         """The rings that a row is along, forwards and backwards, (2, r), and a forest towards free rings."""

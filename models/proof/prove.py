@@ -49,10 +49,10 @@ def prove(
     first proof on a machine compiles its functions before the time limit begins, in up to a minute.
 
     Orthogonal crosses, on any domain, have a proof of their own, on one thread. It has the same properties.
-    With a time limit, a level is begun only if its check is expected to end in time. On surfaces with
-    few strokes, charges give a first bound in about half of the time at most, or in all of it if the gap is
-    below 5 % then. Up to 6,000 points without such a bound, the coarsest level is completed under any time
-    limit, so there is a certificate.
+    With a time limit, a level is begun only if its check is expected to end in time. On surfaces with few
+    strokes, charges give a first bound in about half of the time at most, or in all of it if the gap is below
+    5 % then. Up to 6,000 points without such a bound, the coarsest level is completed under any time limit,
+    so there is a certificate.
 
     The checker of certificates checks the levels at the end, after the time limit; for orthogonal crosses
     within it. Bound, status and forced jumps are those that it confirms, and `write_certificate` writes them.

@@ -6,7 +6,6 @@ some. A change of one integer moves a unit to a neighbouring corner; here a unit
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -48,8 +47,7 @@ def move_charges(energy: OrthogonalEnergy, rings: Rings, z: Ints, is_over: IsOve
         moved = _descend(moved, inverse, apart, is_over)
         if moved @ inverse @ moved < lowered(float(best @ inverse @ best)):
             best = moved
-    turns = np.round(walks @ z + best - charge).astype(np.int32)
-    return replace(energy, sums=walks.tocsc(), turns_along=turns).with_sums(z)
+    return energy.with_charges(z, walks, best)
 
 
 def _descend(charge: Floats, inverse: Floats, apart: Ints, is_over: IsOver) -> Floats:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...array_archive import Arrays
 from ...instance.angles import HALF
-from ...instance.domain import Floats
+from ...instance.domain import Floats, Ints
 from ...processes.compilation import compiled, compiled_inside
 from ..checkers.check_certificate import OPTIMAL
 from ..checkers.check_orthogonal import (
@@ -25,8 +25,8 @@ from ..checkers.check_orthogonal import (
     MOST_SHARES,
     WHOLE,
     Branches,
-    CentredRows,
-    stages_bound,
+    Charges,
+    Clouds,
 )
 
 State = NDArray[np.int8]
@@ -44,15 +44,14 @@ _FLAT: Final = 1e-12  # curvature
 
 
 def branch_arrays(
-    arrays: Arrays, rows: CentredRows, threshold: float, is_over: Callable[[float], bool]
+    charges: Charges, clouds: Clouds, count: Ints, threshold: float, is_over: Callable[[float], bool]
 ) -> tuple[Arrays, Floats | None]:
-    """The arrays of branches in a certificate of charges, and better charges than those of the best field.
+    """The arrays of branches in a certificate, and charges (l,) of less energy than the best field, if any.
 
-    is_over: whether fewer than so many seconds are left. threshold: as of `Proof`. There are no arrays with
-    loops that share not all their rows, or with too many; and charges (l,), in quarter turns, only if some
-    were found.
+    clouds, count: of the last stage, and how many particles of each kind it leaves. threshold: as of `Proof`.
+    is_over: whether fewer than so many seconds are left. Charges are in quarter turns. There are no arrays
+    where loops do not share all their rows, or are too many.
     """
-    _, charges, clouds, count = stages_bound(arrays, rows, threshold)
     units = int(count.sum())
     if not charges.closed.all() or not 0 < max(charges.size, units) <= MOST_BRANCHED or not units:
         return {}, None
@@ -91,7 +90,6 @@ class _Tree:
         mutual = np.where(branches.never, -1.0, branches.mutual)
         self.system = reply @ branches.smeared.T, mutual, alone, branches.sign
         self.empty = float(charges.origin @ branches.inverse @ charges.origin)
-        self.wanted = round(float(charges.origin.sum()))
         room = OPTIMAL / 4 * max(1.0, threshold)
         self.goal = (threshold - room - charges.rows.constant) / HALF**2 - self.empty
         self.unit, self.after = list[int](), dict[int, int]()
@@ -102,7 +100,7 @@ class _Tree:
 
     def _add(self, state: State, shares: Floats) -> None:
         """Add an end. shares: of the branch before, near which those of the end are."""
-        bound, number = _solve(self.system, state, shares, self.wanted, self.goal), len(self.unit)
+        bound, number = _solve(self.system, state, shares, self.branches.wanted, self.goal), len(self.unit)
         if bound < self.goal and (state == 2).any():
             heapq.heappush(self.open, (bound, number))
         elif bound < self.goal:

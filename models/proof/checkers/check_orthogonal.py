@@ -800,7 +800,8 @@ class Branches:
     count (c,): particles of each kind. unit (u,): the kind of each, as of `stage_of`; sign (u,). smeared
     (u, l): what its cloud makes of it, with its sign. alone (u,): what it adds without others or a potential,
     at least. mutual (u, u): what one adds for another one that is there. never (u, u): whether no field has
-    both. inverse (l, l): of the Laplacian, about; bounds hold for any.
+    both. wanted: the sum of signs, if all loops are closed. inverse (l, l): of the Laplacian, about; bounds
+    hold for any.
     """
 
     def __init__(self, charges: Charges, clouds: Clouds, count: Array) -> None:
@@ -814,6 +815,9 @@ class Branches:
         base.check_room(rows.taken + 8 * (size + len(units)) * (6 * size + 6 * len(units)), rows.memory)
         self.margin = charges.margin + base.PRECISION * (size + len(units))
         self.sign, self.loop = clouds.sign[self.unit], clouds.loop[self.unit]
+        total = float(charges.origin.sum())
+        self.wanted, is_whole = round(total), abs(total - round(total)) < 0.1
+        base.require(is_whole or not charges.closed.all(), "loops", "have charges of another sum than 0")
         line, self.laplacian = np.repeat(np.arange(size), np.diff(charges.begin)), np.diag(charges.resistance)
         np.subtract.at(self.laplacian, (line, charges.column), charges.entry)
         part = base.parts_of(size, *charges.links)
@@ -870,10 +874,7 @@ class Branches:
         """
         if not self.charges.closed.all():
             return np.zeros(len(added)), np.ones(len(added), bool)
-        total = float(self.charges.origin.sum())
-        base.require(abs(total - round(total)) < 0.1, "loops", "have charges of another sum than 0")
-        wanted = round(total) - there @ self.sign
-        due, count = wanted + (free & (self.sign < 0)).sum(axis=1), free.sum(axis=1)
+        due, count = self.wanted - there @ self.sign + (free & (self.sign < 0)).sum(axis=1), free.sum(axis=1)
         order = np.sort(np.where(free, added, np.inf), axis=1)
         best = order[np.arange(len(added)), np.clip(due - 1, 0, np.maximum(count - 1, 0))]
         return np.where(count > 0, best, 0.0), (due >= 0) & (due <= count)

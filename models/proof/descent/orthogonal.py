@@ -2,15 +2,15 @@
 
 docs/orthogonal-proofs.md has the lemmas. On every level a dual rises (orthogonal_dual.py), a field is rounded
 from it, and the checker (check_orthogonal.py) computes the bound and what is left. The next level has a third
-of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters. Where
-many points have no stroke, charges (charges.py) and branches on them (branches.py) give a first bound.
+of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters. Where many
+points have no stroke, charges (charges.py) and branches on them (branches.py) give a first bound.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
@@ -247,25 +247,20 @@ class _Prover:
 
     def _branch(self, arrays: Arrays, rows: CentredRows, threshold: float, ahead: float) -> Arrays:
         """The arrays of branches, and a better field if they show one. ahead: seconds for what follows."""
-        bound = checker.charges_bound(arrays, rows, threshold)
+        bound, charges, clouds, count = checker.stages_bound(arrays, rows, threshold)
         if self.least - bound <= OPTIMAL / 2 * max(1.0, self.least):
             return {}
         if self.least - bound < _CLOSED * self.least:  # no level proves as much
             ahead = self.proven.seconds
         branches, better = branch_arrays(
-            arrays, rows, threshold, lambda seconds: self.ends.is_over(ahead + seconds)
+            charges, clouds, count, threshold, lambda seconds: self.ends.is_over(ahead + seconds)
         )
         if better is not None and self.energy.sums is None:
-            self._offer_charges(arrays, better)
+            parts = arrays["loop_sign"], arrays["loop_row"], arrays["loop_start"]
+            walks = csr_array(parts, shape=(len(better), len(self.z)))
+            z = self.energy.with_charges(self.z, walks, better)
+            self._offer(self.energy.descend(z, is_over=self.ends.is_over))
         return branches
-
-    def _offer_charges(self, arrays: Arrays, charges: Floats) -> bool:
-        """Whether integers with these charges of loops are better than the best ones."""
-        parts = arrays["loop_sign"], arrays["loop_row"], arrays["loop_start"]
-        walks = csr_array(parts, shape=(len(charges), len(self.z)))
-        turns = np.round(charges - walks @ (self.energy.constant / HALF)).astype(np.int32)
-        z = replace(self.energy, sums=walks.tocsc(), turns_along=turns).with_sums(self.z)
-        return self._offer(self.energy.descend(z, is_over=self.ends.is_over))
 
     def _leave_out(self, what: str) -> None:
         """Add to the reason what is left out."""

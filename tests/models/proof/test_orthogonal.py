@@ -24,6 +24,7 @@ from crossfield.models.proof.descent.orthogonal import prove_orthogonal
 from instance_kinds import apart, surface
 from meshes import torus
 from orthogonal_certificates import certificate_at
+from scipy.sparse import csr_array
 from small_meshes import (
     beyond_forest,
     fan,
@@ -97,10 +98,8 @@ def bound_of_charges(arrays):
 
 
 def matrix_of_loops(arrays, rows):
-    start = arrays["loop_start"]
-    matrix, loop = np.zeros((len(start) - 1, rows)), np.repeat(np.arange(len(start) - 1), np.diff(start))
-    matrix[loop, arrays["loop_row"]] = arrays["loop_sign"]
-    return matrix
+    parts = [arrays[name] for name in ("loop_sign", "loop_row", "loop_start")]
+    return csr_array(tuple(parts), shape=(len(parts[2]) - 1, rows)).toarray()
 
 
 def admits_charges(arrays, instance, z):
@@ -148,8 +147,7 @@ def test_charges_of_parts_strokes_and_weights_do_not_exceed_the_optimum(seed, ki
 def test_no_branch_has_a_bound_above_the_energies_of_its_charges(mesh):
     rng = np.random.default_rng(0)
     instance = strokeless(mesh, pair_weights=rng.uniform(0.2, 5, len(mesh.first)))
-    z = np.zeros(len(mesh.first), np.int32)
-    rows = checker.CentredRows(prove_from(instance, z, levels=1).certificate())
+    rows = checker.CentredRows(prove_from(instance, 0 * mesh.first, levels=1).certificate())
     arrays = charge_arrays(mesh, rows, 99.0, never)
     _, charges, clouds, count = checker.stages_bound(arrays, rows, 99.0)
     branches, walks = checker.Branches(charges, clouds, count), matrix_of_loops(arrays, len(rows.weight))

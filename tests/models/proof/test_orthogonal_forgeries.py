@@ -275,27 +275,22 @@ BROKEN_CHARGES = [
 """As `BROKEN`, of a closed surface."""
 
 
-def with_tree(first, end=None):
-    """A change of the tree of branches: other nodes before those from some place on."""
-
-    def change(arrays):
-        tree = np.append(first, arrays["branches"])[:end].astype("i4")
-        shares = np.resize(arrays["branch_shares"], ((tree < 0).sum(), arrays["branch_shares"].shape[1]))
-        return arrays | {"branches": tree, "branch_shares": shares}
-
-    return change
+def with_tree(arrays, first, end=None):
+    """Arrays with more nodes before those of the tree of branches, and another end."""
+    tree = np.append(first, arrays["branches"])[:end].astype("i4")
+    shares = np.resize(arrays["branch_shares"], ((tree < 0).sum(), arrays["branch_shares"].shape[1]))
+    return arrays | {"branches": tree, "branch_shares": shares}
 
 
 BROKEN_BRANCHES = [
-    ("go on after the end", with_tree([-1])),
-    ("do not end", with_tree([], -1)),
-    ("by a particle twice", with_tree([1, 1])),
-    ("by a particle twice", with_tree([99])),
+    ("go on after the end", lambda a: with_tree(a, [-1])),
+    ("do not end", lambda a: with_tree(a, [], -1)),
+    ("by a particle twice", lambda a: with_tree(a, [1, 1])),
+    ("by a particle twice", lambda a: with_tree(a, [99])),
     ("branch_particles leaves out", lambda a: a | {"branch_particles": 0 * a["branch_particles"]}),
     ("branch_shares", lambda a: a | {"branch_shares": a["branch_shares"][:, 1:]}),
     ("branch_shares", lambda a: {name: array for name, array in a.items() if name != "branch_shares"}),
 ]
-"""As `BROKEN`, of branches."""
 
 
 @pytest.mark.parametrize(
