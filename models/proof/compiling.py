@@ -23,7 +23,7 @@ from ..processes.compilation import cache_folder, crew, is_all_compiled
 from ..processes.deadline import Deadline, IsOver, Progress, never, silent
 from ..search.greedy import greedy_field
 from ..storage import temporary_folder
-from .bound import charges, orthogonal_dual
+from .bound import branches, charges, orthogonal_dual
 from .bound.dual import Dual
 from .bound.lattice import Lattice
 from .bound.pruning import finer_lattice
@@ -81,10 +81,11 @@ def compile_all(orthogonal: bool) -> None:
         mask, w = np.ones((3, 3), dtype=bool), np.ones(4)
         instance = Instance.on_pixels("small", mask, corners, theta, w, orthogonal=orthogonal)
         if orthogonal:
-            points, none = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float), np.zeros(0)
-            pyramid = Mesh(points, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], np.int32))
-            strokeless = Instance.on_faces("small", pyramid, none.astype(int), none, none, orthogonal=True)
-            for small in (instance, strokeless):  # the second has charges
+            points = np.array([[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 1], [1, 1, 1]], float)
+            faces = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 4], [2, 3, 4], [3, 1, 4]]
+            pyramids, none = Mesh(points, np.array(faces, np.int32)), np.zeros(0)
+            strokeless = Instance.on_faces("small", pyramids, none.astype(int), none, none, orthogonal=True)
+            for small in (instance, strokeless):  # the second has charges, and branches on them
                 prove_orthogonal(small, None, Termination(Deadline(), never, gap=0.0, work=math.inf), silent)
             return
         field = greedy_field(instance)
@@ -110,6 +111,5 @@ def _without_collection() -> Iterator[None]:
 
 def _is_compiled(orthogonal: bool) -> bool:
     """Whether the functions of one of the two kinds of proofs are; they are in separate modules."""
-    return is_all_compiled(
-        lambda module: (module in (charges.__name__, orthogonal_dual.__name__)) == orthogonal
-    )
+    names = [module.__name__ for module in (branches, charges, orthogonal_dual)]
+    return is_all_compiled(lambda module: (module in names) == orthogonal)
