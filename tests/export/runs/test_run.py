@@ -134,9 +134,9 @@ assert not compiled.buffer
         times = {path: path.stat().st_mtime_ns for path in (tmp_path / "cache").rglob("*.nb?")}
         return {path: time for path, time in times.items() if not path.name.startswith("parts.")}
 
-    kept = call("-c", program)
+    kept, options = call("-c", program), ["--time-limit", "100", "-o", str(tmp_path)]
     assert any(path.name.startswith("clusters.") for path in kept)
-    assert kept == call(*"-m crossfield prove mouse --size 8 --time-limit 100 -o".split(), str(tmp_path))
+    assert kept == call("-m", "crossfield", "prove", "mouse", "--size", "8", *options)
     assert (tmp_path / "mouse.proof.certificate.npz").exists()
 
 
