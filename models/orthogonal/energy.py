@@ -17,7 +17,6 @@ from typing import Any, Final, Self
 
 import numpy as np
 from scipy import sparse
-from scipy.optimize import nnls
 
 from ..errors import InstanceError
 from ..field.field import CrossField, field_in_windows
@@ -147,6 +146,8 @@ class OrthogonalEnergy(RightAngles):
             rows = np.nonzero(sides)[0]
             if not new.any() or len(rows) > _MOST_LIMITS:
                 return None
+            from scipy.optimize import nnls  # takes long to load, and few fields come here
+
             normals = sparse.diags_array(sides[rows]) @ self.matrix[rows]
             moves = self.solve_system(normals.T.toarray())
             root = np.linalg.cholesky(normals @ moves + 1e-12 * np.eye(len(rows)))
