@@ -220,7 +220,7 @@ def draw_tutorials() -> None:
     """Draw the fields and the surface of docs/tutorials/solver.md and drawing.md."""
     from crossfield.models.smooth.bend import surface_field
 
-    problem, pictures = cf.formulate(cf.sample("ellipsoid", 7), "milp-mccormick"), DOCS / "pictures"
+    problem, pictures = cf.formulate(cf.sample("ellipsoid", 5), "milp-mccormick"), DOCS / "pictures"
     milp = cf.solve(problem, solver="highs").field
     cf.draw(milp, pictures / "ellipsoid_milp.png", kind="overview", force=True)
     page = (DOCS / "tutorials" / "drawing.md").read_text()

@@ -18,10 +18,10 @@ from loops import for_each
 REMEDY = "build `default` and copy its entries.csv to export/library/plan/entries.csv"
 
 
-def build_part(folder, names, gauges):
+def build_part(folder, names, **changed):
     """Build the tiny instances of the library that ships, of some sketches alone if they are named."""
     spec = default_spec()
-    rungs = [replace(rung, gauges=gauges) for rung in spec.rungs if rung.name == "tiny"]
+    rungs = [replace(rung, gauges=("strokes",), **changed) for rung in spec.rungs if rung.name == "tiny"]
     sketches = [
         replace(sketch, rungs=("tiny",), sizes={key: sketch.sizes[key] for key in {*sketch.sizes} & {"tiny"}})
         for sketch in spec.sketches
@@ -33,7 +33,7 @@ def build_part(folder, names, gauges):
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """The smallest instance of one sketch; not to be changed."""
-    return build_part(tmp_path_factory.mktemp("built"), ["cyl"], ("strokes",))
+    return build_part(tmp_path_factory.mktemp("built"), ["cyl"])
 
 
 def models_of(sidecar):
@@ -47,8 +47,8 @@ def set_of(sidecar):
 
 @pytest.mark.slow
 def test_the_table_and_the_instances_that_ship_are_those_of_a_build(tmp_path):
-    """The points that ship are about them, so nothing is searched."""
-    library = build_part(tmp_path, None, ("strokes",))
+    """The points that ship are about them, so nothing is searched; the table depends on no format."""
+    library = build_part(tmp_path, None, formats=("nl",))
     assert (library.notices, library.failed, library.skipped) == ([], {}, {})
     _, *rows = (library.folder / "entries.csv").read_text().splitlines()
     assert {*rows} == {row for row in SHIPPED.read_text().splitlines() if ",tiny,strokes," in row}, REMEDY
