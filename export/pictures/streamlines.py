@@ -226,10 +226,8 @@ def _trace_halves(
     while len(line):
         middle = crosses.heading(z + step / 2 * heading, heading)
         target = z + step * middle
-        fine = crosses.is_allowed(z, target)
-        fine[fine] &= ~cover.is_blocked(
-            target[fine], crosses.nearest(crosses.pixel(target[fine]), middle[fine]) % 2
-        )
+        family = crosses.nearest(crosses.pixel(target), middle) % 2
+        fine = crosses.is_allowed(z, target) & ~cover.is_blocked(target, family)
         z, way = np.where(fine, target, z), way + np.where(fine, step, 0.0)
         heading = np.where(fine, crosses.heading(z, middle), heading)
         record.append((line[fine], z[fine], heading[fine]))
@@ -292,24 +290,26 @@ class _Cover:
         """Mark what a new line covers."""
         along = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(line.z)))])
         z = np.interp(np.append(np.arange(0.0, along[-1], 1.0 / self.fine), along[-1]), along, line.z)
-        # Half the diagonal of a raster cell more, so that no point of a free cell is nearer than asked.
-        self._mark(self.near, z, CLOSEST * self.separation * self.fine + np.sqrt(0.5))
-        self._mark(self.wide, z, self.separation * self.fine)
+        self._mark(z)
         for raster in (self.near, self.wide):  # its own way for certain, where crosses jump too
             raster[line.family, *self._raster(line.z)] = True
 
-    def _mark(self, raster: Bools, z: Positions, radius: float) -> None:
-        reach = np.arange(-int(radius) - 1, int(radius) + 2)
+    def _mark(self, z: Positions) -> None:
+        # Half the diagonal of a raster cell more, so that no point of a free cell is nearer than asked.
+        near, wide = CLOSEST * self.separation * self.fine + np.sqrt(0.5), self.separation * self.fine
+        reach = np.arange(-int(wide) - 1, int(wide) + 2)
         down, across = (offset.ravel() for offset in np.meshgrid(reach, reach, indexing="ij"))
         row, column = (index[:, None] for index in self._raster(z))
         row, column = row + down, column + across
-        below = row + 0.5 - (0.5 - z.imag[:, None]) * self.fine
-        beyond = column + 0.5 - (0.5 + z.real[:, None]) * self.fine
+        away = (row + 0.5 - (0.5 - z.imag[:, None]) * self.fine) ** 2
+        away += (column + 0.5 - (0.5 + z.real[:, None]) * self.fine) ** 2
         held = (row >= 0) & (column >= 0) & (row < self.shape[0]) & (column < self.shape[1])
-        point, offset = np.nonzero(held & (below**2 + beyond**2 <= radius**2))
-        row, column = row[point, offset], column[point, offset]
+        kept = np.nonzero(held & (away <= wide**2))
+        row, column, away = row[kept], column[kept], away[kept]
         place = row // self.fine + 1, column // self.fine + 1
-        raster[self.crosses.nearest(place, np.gradient(z)[point]) % 2, row, column] = True
+        cell = self.crosses.nearest(place, np.gradient(z)[kept[0]]) % 2, row, column
+        self.wide[cell] = True
+        self.near[tuple(index[away <= near**2] for index in cell)] = True
 
     def fronts(self) -> Iterator[tuple[Positions, Labels]]:
         """Seeds and families of the next candidates, just outside what is covered, until everything is."""

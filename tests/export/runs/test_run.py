@@ -1,17 +1,25 @@
-"""What a run writes and reports: its files, the fields of all methods, what is proven, and the surface."""
+"""What a run writes and reports: its files, the fields of all methods, what is proven, surface and page."""
 
+import io
 import json
 import os
+import re
+import shlex
 import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from html import unescape
 from pathlib import Path
 
 import crossfield as cf
 import pytest
-from cases import SKEWED
+from browsing import CONTRAST, find, served, show, sideways
+from cases import SKEWED, write_point
 from children import complaints
 from command_line import invoke, listed
+from folders import contents
 from meshes import box, write_obj
+from PIL import Image, ImageDraw
 
 FILES = {
     "index.html",
@@ -19,6 +27,29 @@ FILES = {
     "angle.png", "crosses.png", "field.png", "instance.png", "mask.png", "overview.png",
     "overlay.png", "overlay.svg",
 }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def two_parts(tmp_path_factory):
+    """Folder of a run on a sketch whose mask has two parts, its exit code, output and errors, and its files.
+
+    On eight pixels and with a small weight the MILP is solved long before the time limit.
+    Tests may add files.
+    """
+    folder = tmp_path_factory.mktemp("run")
+    sketch, mask = Image.new("L", (60, 40), 255), Image.new("L", (60, 40), 0)
+    for line in ((5, 5, 55, 35), (5, 35, 55, 5), (8, 3, 8, 37)):
+        ImageDraw.Draw(sketch).line(line, fill=0, width=3)
+    for part in ((0, 0, 19, 19), (40, 20, 59, 39)):
+        ImageDraw.Draw(mask).rectangle(part, fill=255)
+    sketch.save(folder / "cross.png")
+    mask.save(folder / "mask.png")
+    options = ["--size", "6", "--stroke-weight", "0.2", "--time-limit", "10", "--threads", "1"]
+    sketch = [str(folder / "cross.png"), "--mask", str(folder / "mask.png")]
+    out, err = io.StringIO(), io.StringIO()
+    with redirect_stdout(out), redirect_stderr(err):
+        code = invoke(["run", *sketch, *options, "-o", str(folder / "out")])
+    return folder / "out", (code, out.getvalue(), err.getvalue()), contents(folder / "out")
 
 
 @pytest.mark.slow
@@ -103,6 +134,81 @@ def test_a_run_on_a_mesh_file_writes_fields_and_a_report(tmp_path, monkeypatch, 
     assert {method["method"] for method in facts["methods"]} >= {"greedy", "power", "search"}
     assert facts["methods"][0]["singularities"] == 8
     assert "12 faces of a mesh" in Path("out/index.html").read_text()
+
+
+# The page in a browser: what it shows, its layers, and its width, contrast and links
+
+
+@pytest.fixture
+def folder(two_parts):
+    return two_parts[0]
+
+
+@pytest.fixture
+def address(folder):
+    with served(folder) as site:
+        yield f"{site}/index.html"
+
+
+def displayed(browser, layer):
+    return browser.execute_script(f"return getComputedStyle(document.getElementById('{layer}')).display")
+
+
+@pytest.mark.slow
+def test_layers_are_switched(browser, address):
+    browser.get(address)
+    assert (displayed(browser, "crosses"), displayed(browser, "streamlines-u")) == ("none", "inline")
+    find(browser, "#show-crosses").click()
+    find(browser, "#show-streamlines-u").click()
+    assert (displayed(browser, "crosses"), displayed(browser, "streamlines-u")) == ("inline", "none")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_fits_and_can_be_read(browser, address, width, scheme):
+    show(browser, width=width, scheme=scheme)
+    browser.get(address)
+    browser.execute_script("document.querySelectorAll('details').forEach(each => each.open = true)")
+    (window, page), beyond = sideways(browser)
+    assert page <= window == width
+    assert beyond == []
+    assert browser.execute_script(CONTRAST)[0][0] >= 4.5
+
+
+@pytest.mark.slow
+def test_links_lead_to_files_and_nothing_comes_from_elsewhere(folder):
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    links = re.findall(r'href="((?!data:)[^"]+)"', page)
+    assert len(links) > 34
+    assert [link for link in links if not (folder / link).exists()] == []
+    assert re.findall(r'(?:src|href)="(?:https?:)?//', page) == []
+    report = json.loads((folder / "report.json").read_text())
+    assert all(doubt in unescape(page) for doubt in report["surface"]["doubts"])
+
+
+@pytest.mark.slow
+def test_the_line_that_reads_an_answer_back_reads_it(folder, monkeypatch):
+    instance = cf.read_instance(next((folder / "models").glob("*.instance.json")))
+    problem = cf.formulate(instance, "milp-mccormick")
+    stem = f"{instance.name}.milp-mccormick"
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    (line,) = re.findall(rf"^crossfield read {stem}\.mps\.sol .*$", page, re.MULTILINE)
+    write_point(folder / f"{stem}.mps.sol", problem, problem.point(cf.greedy_field(instance)))
+    monkeypatch.chdir(folder)
+    assert invoke(shlex.split(line.removesuffix("</pre>"))[1:]) == 0
+    assert (folder / f"{stem}.npz").exists()
+
+
+@pytest.mark.slow
+def test_the_first_line_works_with_what_a_plain_installation_has(folder, monkeypatch):
+    page = (folder / "index.html").read_text(encoding="utf-8")
+    first, *_ = re.findall(r"<pre[^>]*>([^<]*)", page)
+    monkeypatch.chdir(folder)
+    program, *arguments = shlex.split(first)
+    assert program == "crossfield"
+    assert invoke([*arguments, "--time-limit", "2"]) == 0
+    assert list((folder / arguments[-1]).glob("*.field.npz"))
 
 
 # Compiling
