@@ -11,7 +11,6 @@ import ampl_by_glpk
 import crossfield as cf
 import gams_reader
 import numpy as np
-import pyomo.environ as pyo
 import pytest
 from cases import OPTIONS
 from crossfield.export.formats.gams import MODEL_TYPES
@@ -28,7 +27,6 @@ from folders import contents
 from instance_kinds import SMALL, first_field, grid, kind
 from oracles import by_asl
 from places import GOLDEN
-from pyomo.repn.plugins.nl_writer import NLWriter
 
 VALUES = OPTIONS | {"change": ["jumps fixed", "windows narrowed"]}
 """Values of each option; `change` is one of the problem."""
@@ -427,6 +425,8 @@ WEIGHTED = [
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_the_pyomo_model_is_the_problem(formulation, tmp_path):
     """Names, bounds, values; and Pyomo's own .nl announces the same counts as ours."""
+    import pyomo.environ as pyo  # takes long, and one worker runs this
+
     row = next(row for row in WEIGHTED if row[1] == formulation)
     problem, field = problem_of(*row), field_of(row[0])
     model = problem.to_pyomo(start=field)
@@ -458,6 +458,8 @@ def our_name(component):
 
 def assert_counts(problem, model, path):
     """The heads of both .nl files agree; Pyomo leaves out columns in no term."""
+    from pyomo.repn.plugins.nl_writer import NLWriter
+
     stream = io.StringIO()
     NLWriter().write(model, stream, linear_presolve=False, scale_model=False)
     theirs = [line.partition("#")[0].split() for line in stream.getvalue().splitlines()[:10]]
