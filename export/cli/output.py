@@ -141,9 +141,9 @@ def show_report(report: Report, folder: Path) -> None:
         certificate = report.folder / report.proof["certificate"]
         print_line(f"  no field has less than {bound}; certificate: {certificate}")
     if report.surface is not None:
-        doubts = "; ".join(report.surface.doubts)
         layers = f"surface, as layers for the drawing: {folder / 'shaded.png'} and normals.png"
-        print_line(_wrap(f"no shaded surface: {doubts}; crossfield shade draws it" if doubts else layers))
+        missing = "no shaded surface: time was over before it had settled; crossfield shade draws it"
+        print_line(_wrap(layers if report.shaded else missing))
         _show_choices(report.surface)
     print_line(f"  {report.files} solver files: {folder / 'models'}; all results: {folder / 'index.html'}")
     print_line(f"  {report.seconds:.1f} s in all")
@@ -220,8 +220,6 @@ def show_surface(surface: Surface, facts: dict[str, Any], folder: Path) -> None:
     for name, text in facts["support"].items():
         print_line(_wrap(f"{name}: {text}"))
     _show_choices(surface)
-    for doubt in surface.doubts:
-        print_notice(f"in doubt: {doubt}")
     pictures = facts["pictures"]
     print_line(_wrap(f"pictures show {pictures['show']}, {pictures['width']} x {pictures['height']} pixels"))
     print_line(f"pictures, heights, mesh: {folder}")

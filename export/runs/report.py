@@ -90,7 +90,7 @@ class Report:
     @property
     def shaded(self) -> bool:
         """Whether there is a surface that has settled, which is therefore drawn."""
-        return self.surface is not None and not self.surface.doubts
+        return self.surface is not None and not self.surface.interrupted
 
     def facts(self, candidate: Candidate) -> dict[str, Any]:
         """Facts of a field in the report: its own, and bound and gap if there is a proven bound."""

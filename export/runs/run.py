@@ -390,7 +390,7 @@ def lift_and_draw(kept: CrossField, folder: Path, underlay: Underlay | None) -> 
     """Lift a field to a surface, and draw that unless time was over; for a child process."""
     deadline = Deadline.after(LONGEST_LIFT)
     lifted = surface(kept, stop=lambda: deadline.passed() or is_stopped())
-    if not lifted.doubts:
+    if not lifted.interrupted:
         write_layers(lifted, folder, underlay)
     return lifted
 

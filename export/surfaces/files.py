@@ -242,7 +242,7 @@ def surface_facts(surface: Surface) -> dict[str, Any]:
         "height_range_pixels": np.ptp(surface.corners),
     }
     return {
-        "doubts": list(surface.doubts),
+        "interrupted": surface.interrupted,
         "support": describe_support(surface.field, np.radians(off)),
         "freedom": [choice.document() for choice in surface.freedom],
         **{name: round(float(value), 4) for name, value in numbers.items()},

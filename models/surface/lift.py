@@ -62,8 +62,8 @@ def surface(
         Places (x, y) in the drawing whose parts are bowls: they lean inward at their border on the whole, or
         downward where that is undecided, also with `flip`. Hints of 10 degrees slant or more take precedence.
     stop
-        A function that returns whether to stop, or an event. The best heights so far are then returned with
-        a doubt.
+        A function that returns whether to stop, or an event. The surface of the heights so far is then
+        `interrupted`.
     progress
         Receives a line of text when a part begins.
 
@@ -104,9 +104,9 @@ def surface(
             if another:
                 place = place_of(instance, another.row, another.column)
                 freedom.append(Freedom("depth", number, level.grid.size, place, another))
-    late = ("time was over before it had settled",) if is_over() else ()
+    interrupted = is_over()
     trust = confidence_of(field, right_angle_deviation(field, heights))
-    return Surface(field, heights, trust, late, tuple(freedom))
+    return Surface(field, heights, trust, tuple(freedom), interrupted)
 
 
 def _solve_part(part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool) -> Floats:

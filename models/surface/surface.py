@@ -28,23 +28,24 @@ class Surface(Pictured):
     confidence
         How well the equations hold at each pixel, float (n,) in [0, 1]. It does not measure the distance from
         the intended surface.
-    doubts
-        A sentence if time was over before the heights had settled. A surface without one can be wrong too.
     freedom
         Choices that the crosses leave open, with the option that decides each. Flatter and deeper surfaces
         often fit too where none is named.
+    interrupted
+        Whether `stop` ended the descent before the heights had settled.
 
     """
 
     field: CrossField
     heights: Floats
     confidence: Floats
-    doubts: tuple[str, ...] = ()
     freedom: tuple[Freedom, ...] = ()
+    interrupted: bool = False
 
     def __repr__(self) -> str:
         deep = np.nanmax(self.heights) - np.nanmin(self.heights)
-        return f"<Surface on {self.instance.name}: {deep:.4g} pixels deep, doubts {len(self.doubts)}>"
+        end = ", interrupted" if self.interrupted else ""
+        return f"<Surface on {self.instance.name}: {deep:.4g} pixels deep{end}>"
 
     @property
     def instance(self) -> Instance:

@@ -97,7 +97,7 @@ def test_the_folder_has_heights_pictures_and_facts(tmp_path):
     assert sizes == dict.fromkeys(("normals.png", "shaded.png", "overlay.png"), (1020, 1020, "RGBA"))
     assert (folder / "surface.mtl").read_text().split()[-2:] == ["map_Kd", "drawing.png"]
     facts = json.loads((folder / "surface.json").read_text())
-    assert facts["doubts"] == []
+    assert facts["interrupted"] is False
     assert facts["pictures"]["show"] == "the grid, as the page is unknown: give the drawing"
     assert (facts["pictures"]["page"], facts["pictures"]["width"]) == ([0, 0, 12, 12], 1020)
     assert facts["instance"]["sha256"] == surface.instance.sha256

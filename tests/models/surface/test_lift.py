@@ -165,6 +165,12 @@ def test_singular_spots_have_no_confidence(name):
     assert (cf.surface(field).confidence[at] == 0).all()
 
 
+def test_a_surface_that_was_stopped_says_so():
+    field = cf.power_field(cf.sample("bottle", 9))
+    assert cf.surface(field, stop=lambda: True).interrupted
+    assert not cf.surface(field).interrupted
+
+
 @pytest.mark.slow
 def test_crosses_of_no_surface_have_little_confidence():
     instance = cf.sample("mouse", 9)
