@@ -108,7 +108,8 @@ def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
     rows, columns = (np.arange(int(side / reduced) + 1) * reduced for side in picture.ink.shape)
     small = block_means(picture.ink, rows, columns)
     red = block_means(picture.red * picture.ink, rows, columns) / np.maximum(small, 1e-6)
-    ways = trace_shape(small * max(1.0, reduced / picture.stroke_width) > _INK)
+    ink = small * max(1.0, reduced / picture.stroke_width) > _INK
+    ways = trace_shape(ink)
     is_red = np.array([np.median(red[tuple(way.T)]) > _RED for way in ways], dtype=bool)
     as_lines = is_red if picture.has_two_colours and is_red.any() else np.ones(len(ways), dtype=bool)
     pen = max(1.0, picture.stroke_width / reduced)
@@ -117,12 +118,12 @@ def _trace_picture(picture: Bitmap) -> tuple[Box, list[dict[str, Any]]]:
         (mark, smooth_way(way))
         for mark, chosen in marks
         if chosen.any()
-        for way in join_ways([ways[number] for number in np.flatnonzero(chosen)], pen)
+        for way in join_ways([ways[number] for number in np.flatnonzero(chosen)], pen, ink)
     ]
     # Middle lines end half a pen before their ink. On the box of the ink, they are read on the same grid.
     low, high = (end(np.concatenate([line for _, line in traced]), axis=0) for end in (np.min, np.max))
-    ink = np.reshape(picture.box, (2, 2))
-    scale = (ink[1] - ink[0]) / np.where(high > low, high - low, np.inf)
-    middle = ink.mean(axis=0) - scale * (low + high) / 2
+    box = np.reshape(picture.box, (2, 2))
+    scale = (box[1] - box[0]) / np.where(high > low, high - low, np.inf)
+    middle = box.mean(axis=0) - scale * (low + high) / 2
     strokes = [_stroke_document(scale * line + middle, mark) for mark, line in traced]
     return (0.0, 0.0, float(picture.width), float(picture.height)), strokes

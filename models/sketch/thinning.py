@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..instance.angles import vector_length
 from ..instance.domain import Bools, Floats
 
 _SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
@@ -16,7 +18,12 @@ _SHORTEST: Final = 6  # pixels of a traced line; shorter ones, or than a stroke 
 _SHORTEST_LINK: Final = 4  # pixels of a traced line between two junctions
 _LINK: Final = 2.0  # pens that a link inside a junction is long
 _REACH: Final = 5.0  # pens from the end of a way to that of another one across a junction
-_TURN: Final = np.radians(35)  # greatest angle between a way and its continuation
+_TURN: Final = np.radians(35)  # greatest angle between a way and its continuation; least one at a corner
+_APART: Final = 2.5  # pens between their places half-way
+_INKED: Final = 0.9  # least share of the distance between their ends that has ink
+_SKIP: Final = 1.5  # pens at the end of a way, where thinned strokes turn aside
+_FAR: Final = 12.0  # pens of a way that show how it goes on
+_ARM: Final = 3.0  # pens to either side of a corner, within which a line turns
 _AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
 
 _Pixel = tuple[int, int]
@@ -42,31 +49,35 @@ def trace_shape(shape: Bools, *, trim: bool = False) -> list[NDArray[np.int64]]:
     ]
 
 
-def join_ways(ways: Sequence[NDArray[np.int64]], pen: float) -> list[NDArray[np.int64]]:
-    """Traced lines, joined where one continues another one across a junction, the straightest first.
+def join_ways(ways: Sequence[NDArray[np.int64]], pen: float, ink: Bools) -> list[NDArray[np.int64]]:
+    """Traced lines from corner to corner, joined where one continues another one, the straightest first.
 
-    pen: width of the strokes in pixels. Lines that are shorter than two pens lie inside a junction.
+    pen: width of the strokes in pixels. Lines of less than two pens between two junctions lie inside one.
+    ink: the picture [h, w], which has ink between ends that are joined.
     """
     from scipy.spatial import KDTree
 
+    ways = [part for way in ways for part in _split_at_corners(way, int(_ARM * pen))]
     sides = [side for way in ways for side in (way, way[::-1])]
-    far = [side[min(int(4 * pen) + 4, len(side) - 1)] for side in sides]
-    # Thinned strokes turn aside in a junction.
-    inward = np.subtract(far, [side[int(pen) if len(side) > 2 * pen + 3 else 0] for side in sides])
-    inward = inward / np.maximum(np.hypot(*inward.T), 1)[:, None]
-    ends, is_long = (
-        np.array([side[0] for side in sides]),
-        np.array([len(side) > _LINK * pen for side in sides]),
-    )
+    ends = np.array([side[0] for side in sides])
+    _, place, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    is_free = (count[place.ravel()] == 1).reshape(-1, 2).any(axis=1)  # NumPy 2.0 adds an axis
+    is_long = np.repeat([len(way) > _LINK * pen for way in ways] | is_free, 2)
     pairs = KDTree(ends).query_pairs(_REACH * pen, output_type="ndarray")
     pairs = pairs[is_long[pairs].all(axis=1) & (pairs[:, 0] // 2 != pairs[:, 1] // 2)]
-    (first, second), gap = pairs.T, np.diff(ends[pairs], axis=1)[:, 0]
-    length = np.hypot(*gap.T)
-    ahead = np.sum(gap * (inward[second] - inward[first]), axis=1) / 2 / np.maximum(length, 1)
-    straight = -np.sum(inward[first] * inward[second], axis=1)
-    straight = np.where(length > _LINK * pen, np.minimum(straight, ahead), straight)
+    gap = np.diff(ends[pairs], axis=1)
+    between = ends[pairs[:, :1]] + np.linspace(0, 1, int(2 * _REACH * pen) + 1)[:, None] * gap
+    has_ink = ink[tuple(np.rint(between).astype(int).T)].mean(axis=0) >= _INKED
+    # Both curves, as far as the middle of the gap, where one that continues the other has its place and way.
+    ended = np.array([_fit_end(side, pen) for side in sides])
+    place, slope, bend = np.moveaxis(ended[pairs], 2, 0)
+    back = -vector_length(*gap.T).T[..., None] / 2
+    apart = vector_length(*np.diff(place + back * slope + back**2 * bend, axis=1)[:, 0].T) / pen
+    ahead = slope + 2 * back * bend
+    turn = _angle_between(ahead[:, 0], -ahead[:, 1])
+    is_smooth = has_ink & (turn < _TURN) & (apart < _APART)
     after = np.full(len(sides), -1)
-    for pair in pairs[np.argsort(-straight, kind="stable")][: np.sum(straight > np.cos(_TURN))]:
+    for pair in pairs[is_smooth][np.argsort((turn / _TURN + apart)[is_smooth], kind="stable")]:
         if (after[pair] < 0).all():
             after[pair] = pair[::-1]
     joined, used = [], np.zeros(len(ways), dtype=bool)
@@ -79,6 +90,42 @@ def join_ways(ways: Sequence[NDArray[np.int64]], pen: float) -> list[NDArray[np.
         if parts:
             joined.append(np.concatenate([*parts, parts[0][:1]] if end >= 0 else parts))
     return joined
+
+
+def _fit_end(side: NDArray[np.int64], pen: float) -> Floats:
+    """Coefficients (3, 2) of a parabola along a line from its first point, near which thinned lines turn."""
+    skipped = int(_SKIP * pen) if len(side) > 2 * _SKIP * pen + 3 else 0
+    part = side[skipped : int(_FAR * pen) + 4]
+    steps = vector_length(*np.diff(part, axis=0, prepend=side[:1]).T)
+    degree = 2 if len(part) > 4 * pen else 1
+    fitted = np.polyfit(np.cumsum(steps), part, degree)[::-1]
+    return np.concatenate([fitted, np.zeros((2 - degree, 2))])
+
+
+def _split_at_corners(way: NDArray[np.int64], arm: int) -> list[NDArray[np.int64]]:
+    """The parts of a traced line (k, 2) between its corners, where it turns abruptly."""
+    if len(way) <= 2 * arm:
+        return [way]
+    from scipy import ndimage
+
+    at = np.arange(arm, len(way) - arm)
+
+    def run(begin: int, end: int) -> Floats:
+        first, last = (way[np.clip(at + step, 0, len(way) - 1)].astype(np.float64) for step in (begin, end))
+        return last - first
+
+    turn = _angle_between(run(-arm, 0), run(0, arm))
+    around = _angle_between(run(-3 * arm, -arm), run(arm, 3 * arm))
+    turn = np.where(turn > np.maximum(_TURN, around / 2), turn, 0.0)
+    corners = at[(turn > 0) & (turn == ndimage.maximum_filter1d(turn, 2 * arm + 1))]
+    corners = corners[np.diff(corners, prepend=-arm) > arm]
+    return [way[first : last + 1] for first, last in pairwise([0, *corners.tolist(), len(way) - 1])]
+
+
+def _angle_between(first: Floats, second: Floats) -> Floats:
+    """The angles between vectors (k, 2), in radians."""
+    across = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    return np.asarray(np.abs(np.arctan2(across, (first * second).sum(axis=1))))
 
 
 def thin_shape(shape: Bools) -> Bools:

@@ -278,6 +278,14 @@ def test_lines_of_a_picture_continue_across_junctions():
     assert sorted(np.ptp(points, axis=0).max() > 150 for points in strokes) == [True] * 6
 
 
+def test_lines_of_a_picture_end_at_corners_and_gaps():
+    image = Image.new("RGB", (200, 200), "white")
+    for line in ([20, 20, 180, 20, 180, 180, 20, 180, 20, 20], [50, 100, 95, 100], [108, 100, 150, 100]):
+        ImageDraw.Draw(image).line(line, fill="black", width=4)
+    strokes = [np.reshape(s["points"], (-1, 2)) for s in open_drawing(png(image), "a.png")["strokes"]]
+    assert sorted(np.ptp(points, axis=0).max() > 150 for points in strokes) == [False] * 2 + [True] * 4
+
+
 def test_a_red_speck_of_a_picture_makes_no_black_line_a_cut():
     image = Image.new("RGB", (200, 160), "white")
     ImageDraw.Draw(image).line([20, 80, 180, 80], fill="black", width=3)
