@@ -31,11 +31,11 @@ from ..input_limits import (
     MAX_USES,
 )
 from ..instance.angles import transform_vectors, vector_length
-from ..instance.domain import Bools, Floats
+from ..instance.domain import Bools, Floats, Ints
 from .cascade import UNSHOWN, Cascade, background_of, cascade_of
 from .colour import PAPER, is_red
 from .cover import Box
-from .curves import STRAIGHT, Curves, lines_as_cubics, run_numbers
+from .curves import Curves, lines_as_cubics, run_numbers
 from .labels import LabelMatcher, colour_label, labels_of
 from .path_data import SHAPES, path_data, shape_curves, too_many_curves
 from .svg_effort import choose_side
@@ -60,7 +60,7 @@ from .svg_page import (
     view_box,
     window_around,
 )
-from .thinning import smooth_way, trace_shape
+from .thinning import join_ways, smooth_way, trace_shape
 from .visible import PaintedShape, Seen, choose_paper, opaque_colour, picture_of, see_strokes
 
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
@@ -86,6 +86,7 @@ _FAR: Final = 1000.0  # sides of the page: coordinates beyond it are too large f
 _FINEST: Final = 1e-5  # of the page: least width of a stroke that is seen
 _FAINT: Final = 0.24  # of the strength of others: less than half as dark, or a quarter as wide
 _STRONG: Final = 0.1  # of the length of lines: part that is stronger than what others are compared with
+_ASIDE: Final = 0.06  # of its chord: distance of a straight line from it, also of one drawn by hand
 _CORNER: Final = 0.02  # of the sides of the box of other lines: distance from a corner of it
 _MOST_STOPS: Final = 100  # stops of a gradient that count
 _MOST_BODIES: Final = 1000  # larger areas with which an area is compared
@@ -280,20 +281,20 @@ def _trace_strokes(
     picture = picture_of(root)
     # Black, red and white, paler where a stroke or its layer is translucent.
     is_ink, is_red = picture[..., 1] < 255 * (1 - PAPER), picture[..., 0] > picture[..., 1]
-    ways = [(way, red) for red in (False, True) for way in trace_shape(is_ink & (is_red == red), trim=True)]
-    if not ways:
+    traced = [trace_shape(is_ink & (is_red == red), trim=True) for red in (False, True)]
+    if not any(traced):
         raise InputError("shows no stroke: its filled strokes are hidden")
+    pen = max(1.0, is_ink.sum() / sum(len(way) for ways in traced for way in ways))
+    ways = [(way, red) for red, ways in enumerate(traced) if ways for way in join_ways(ways, pen, is_ink)]
     pixel = np.array(window[2:]) / picture.shape[1::-1]
     lines = [window[:2] + pixel * (smooth_way(way) + 0.5) for way, _ in ways]
     cubics = [lines_as_cubics(line[:-1], line[1:]) for line in lines]
     number = np.repeat(np.arange(len(ways), dtype=np.int32), [len(part) for part in cubics])
-    strength = [float(np.median(difference[tuple(way.T)])) ** 2 for way, _ in ways]
-    seen = [Seen(part, (0.0, 0.0, 0.0), each) for part, each in zip(cubics, strength, strict=True)]
-    red = np.array([is_line for _, is_line in ways], dtype=bool)
-    chosen = red[number] if has_choice else None
-    faint = _find_faint(seen, red) & ~(has_choice & red)
-    box = page.box if page else None
-    return Curves(np.concatenate(cubics), number, red[number], box, chosen, notes, faint[number])
+    strength = np.array([np.median(difference[tuple(way.T)]) ** 2 for way, _ in ways])
+    red, points = np.array([is_line for _, is_line in ways], dtype=bool)[number], np.concatenate(cubics)
+    chosen = red if has_choice else None
+    faint = _find_faint(points, number, strength[number], red) & ~(has_choice & red)
+    return Curves(points, number, red, page.box if page else None, chosen, notes, faint)
 
 
 def _leave_out_areas(
@@ -371,27 +372,35 @@ def _join_strokes(
                 for shape, part in zip(shapes, seen, strict=True)
             ]
         )
-    is_faint = _find_faint(seen, red) if taken is None else _find_faint(seen, taken) & ~taken
     points = np.concatenate([part.points for part in seen])
     number = np.repeat(np.arange(len(seen), dtype=np.int32), [len(part.points) for part in seen])
-    chosen = None
+    run, red, chosen = run_numbers(points, number), red[number], None
     if matcher is not None and taken is not None:
         chosen = taken[number]
         matcher.check(any_stroke=bool(chosen.any()))
-    box = page.box if page else None
-    return Curves(points, run_numbers(points, number), red[number], box, chosen, notes, is_faint[number])
+    strength = np.array([part.strength for part in seen])[number]
+    is_line = red if chosen is None else chosen
+    # An element has several lines, or dashes of one.
+    faint = _find_faint(points, run, strength, is_line) | _find_faint(points, number, strength, is_line)
+    if chosen is not None:
+        faint &= ~chosen
+    return Curves(points, run, red, page.box if page else None, chosen, notes, faint)
 
 
-def _find_faint(seen: Sequence[Seen], is_line: Bools) -> Bools:
-    """Which lines are much paler or thinner than the others of their kind; straight ones, than all others.
+def _find_faint(points: Floats, number: Ints, strength: Floats, is_line: Bools) -> Bools:
+    """Which cubics (k,) are of lines much paler or thinner than others of their kind; if straight, than all.
 
     Where all strokes are curvature lines, pale ones may be sections of the object. Only straight ones that
     begin and end outside of the others, or in corners of their box, are surely construction lines.
+
+    number: of the line of each cubic, ascending.
     """
-    strength = np.array([part.strength for part in seen])
-    ends = np.array([part.points[[0, -1], [0, 3]] if len(part.points) else np.zeros((2, 2)) for part in seen])
-    legs = [vector_length(*np.moveaxis(np.diff(part.points, axis=1), -1, 0)) for part in seen]
-    length = np.array([leg.sum() for leg in legs])
+    first = np.flatnonzero(np.diff(number, prepend=-1))
+    after = np.append(first[1:], len(number))
+    strength, is_line = strength[first], is_line[first]
+    ends = np.stack([points[first, 0], points[after - 1, 3]], axis=1)
+    legs = vector_length(*np.moveaxis(np.diff(points, axis=1), -1, 0)).sum(axis=1)
+    length = np.add.reduceat(legs, first)
 
     def is_weak(kind: Bools) -> Bools:
         order = np.argsort(-np.where(kind, strength, np.nan), kind="stable")  # not numbers are last
@@ -399,18 +408,23 @@ def _find_faint(seen: Sequence[Seen], is_line: Bools) -> Bools:
         strong = strength[order[np.searchsorted(ahead, _STRONG * ahead[-1])]]
         return np.asarray(kind & (strength <= _FAINT * strong))
 
-    weak = is_weak(np.ones(len(seen), dtype=bool))
-    is_straight = vector_length(*(ends[:, 1] - ends[:, 0]).T) >= STRAIGHT * length
-    if is_line.any() and not is_line.all():
-        return (weak & is_straight) | is_weak(is_line) | is_weak(~is_line)
-    corners = np.concatenate(
-        [part.points.reshape(-1, 2) for part, faint in zip(seen, weak, strict=True) if not faint]
+    weak = is_weak(np.ones(len(first), dtype=bool))
+    way = ends[:, 1] - ends[:, 0]
+    ahead, beside = (
+        np.repeat(way, after - first, axis=0),
+        points - np.repeat(ends[:, :1], after - first, axis=0),
     )
+    across = np.abs(ahead[:, :1] * beside[..., 1] - ahead[:, 1:] * beside[..., 0]).max(axis=1)
+    is_straight = np.maximum.reduceat(across, first) <= _ASIDE * (way**2).sum(axis=1)
+    is_straight &= way.any(axis=1)
+    if is_line.any() and not is_line.all():
+        return np.repeat((weak & is_straight) | is_weak(is_line) | is_weak(~is_line), after - first)
+    corners = points[~np.repeat(weak, after - first)].reshape(-1, 2)
     low, high = corners.min(axis=0), corners.max(axis=0)
     room = _CORNER * (high - low)
     is_corner = ((ends < low + room) | (ends > high - room)).all(axis=2)
     is_outside = ((ends < low) | (ends > high)).any(axis=2) | is_corner
-    return np.asarray(weak & is_straight & is_outside.all(axis=1))
+    return np.repeat(weak & is_straight & is_outside.all(axis=1), after - first)
 
 
 def _list_unread(
