@@ -261,29 +261,24 @@ def test_a_picture_is_traced_to_strokes_with_marks():
     assert session["name"] == "etc_photo"
     assert session["page"] == [0, 0, 200, 160]
     assert Image.open(io.BytesIO(b64decode(session["picture"]))).size == (200, 160)
-    lines = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "line"]
-    cuts = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "cut"]
-    assert len(lines) == len(cuts) == 1
-    assert np.abs(lines[0][:, 1] - 80.5).max() < 2
-    assert np.ptp(lines[0][:, 0]) > 150
-    assert np.abs(np.hypot(*(cuts[0] - [145.5, 35.5]).T) - 24).max() < 3
+    (line,) = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "line"]
+    (cut,) = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "cut"]
+    assert np.abs(line[:, 1] - 80.5).max() < 2
+    assert np.ptp(line[:, 0]) > 150
+    assert np.abs(np.hypot(*(cut - [145.5, 35.5]).T) - 24).max() < 3
 
 
-def test_lines_of_a_picture_continue_across_junctions():
-    image, places = Image.new("RGB", (200, 200), "white"), (60, 100, 140)
-    for at in places:
-        ImageDraw.Draw(image).line([20, at, 180, at + 10], fill="black", width=4)
-        ImageDraw.Draw(image).line([at, 20, at, 180], fill="black", width=4)
-    strokes = [np.reshape(s["points"], (-1, 2)) for s in open_drawing(png(image), "a.png")["strokes"]]
-    assert sorted(np.ptp(points, axis=0).max() > 150 for points in strokes) == [True] * 6
+GRID = [line for at in (60, 100, 140) for line in ((20, at, 180, at + 10), (at, 20, at, 180))]
+GAPS = [(20, 20, 180, 20, 180, 180, 20, 180, 20, 20), (50, 100, 95, 100), (108, 100, 150, 100)]
 
 
-def test_lines_of_a_picture_end_at_corners_and_gaps():
+@for_each("lines, is_long", [(GRID, [1, 1, 1, 1, 1, 1]), (GAPS, [0, 0, 1, 1, 1, 1])])
+def test_lines_of_a_picture_continue_across_junctions_and_end_at_corners_and_gaps(lines, is_long):
     image = Image.new("RGB", (200, 200), "white")
-    for line in ([20, 20, 180, 20, 180, 180, 20, 180, 20, 20], [50, 100, 95, 100], [108, 100, 150, 100]):
-        ImageDraw.Draw(image).line(line, fill="black", width=4)
+    for places in lines:
+        ImageDraw.Draw(image).line(places, fill="black", width=4)
     strokes = [np.reshape(s["points"], (-1, 2)) for s in open_drawing(png(image), "a.png")["strokes"]]
-    assert sorted(np.ptp(points, axis=0).max() > 150 for points in strokes) == [False] * 2 + [True] * 4
+    assert sorted(np.ptp(points, axis=0).max() > 150 for points in strokes) == is_long
 
 
 def test_a_red_speck_of_a_picture_makes_no_black_line_a_cut():
@@ -295,8 +290,7 @@ def test_a_red_speck_of_a_picture_makes_no_black_line_a_cut():
 
 def test_hatching_comes_ignored_unless_nothing_else_is_a_curvature_line():
     hatch = "".join(f'<path d="M{20 + 2 * k} 30l9 20"/>' for k in range(12))
-    body = '<circle cx="50" cy="50" r="45"/>'
-    flow = '<path d="M10 50Q50 30 90 50"/>'
+    body, flow = '<circle cx="50" cy="50" r="45"/>', '<path d="M10 50Q50 30 90 50"/>'
     drawing = f'<svg fill="none"><g stroke="black">{body}{hatch}</g><g stroke="red">{flow}</g></svg>'
     session = open_drawing(drawing.encode(), "body.svg")
     assert [stroke["mark"] for stroke in session["strokes"]] == ["cut", *12 * ["ignored"], "line"]

@@ -273,15 +273,12 @@ def test_the_same_drawing_in_any_kind_of_picture(kind):
 
 def test_junctions_drop_out_and_darker_strokes_are_stronger():
     image = Image.new("L", (300, 300), 255)
-    draw = ImageDraw.Draw(image)
-    draw.line((30, 150, 270, 150), fill=0, width=3)
-    draw.line((150, 30, 150, 270), fill=0, width=3)
-    draw.line((30, 250, 270, 250), fill=150, width=3)
+    for line, ink in (((30, 150, 270, 150), 0), ((150, 30, 150, 270), 0), ((30, 250, 270, 250), 150)):
+        ImageDraw.Draw(image).line(line, fill=ink, width=3)
     instance = read(png(image), 25, "a.png")
     weight = as_map(instance, instance.w)
-    row, column, faint = (
-        int((at - instance.origin[axis]) / instance.pixel_size) for at, axis in ((150, 1), (150, 0), (250, 1))
-    )
+    places = np.subtract([150, 150, 250], np.take(instance.origin, [1, 0, 1]))
+    row, column, faint = (places / instance.pixel_size).astype(int)
     assert np.isnan(weight[row, column]) or weight[row, column] < 0.3
     assert np.nanmax(weight[row, 3:8]) > 0.8
     assert np.nanmax(weight[faint, 3:8]) < 0.7 * np.nanmax(weight[row, 3:8])
