@@ -61,7 +61,8 @@ def mathml(formula: str, *, whole: bool = False) -> str:
         return ""
     root = fromstring(convert(formula, display="block").replace(_NAMESPACE, ""))
     for bar in (operator for operator in root.iter("mo") if operator.text == "|"):
-        bar.attrib |= {"lspace": "0", "rspace": "0"}  # a bracket, which browsers take for a relation
+        # A bracket, which browsers take for a relation, and lower where it alone has an exponent.
+        bar.attrib = {"stretchy": "false", **bar.attrib, "lspace": "0", "rspace": "0"}
     pieces: list[str] = []
     for children in [list(root[0])] if whole else _pieces(list(root[0])):
         math = ET.Element("math", {"xmlns": "http://www.w3.org/1998/Math/MathML", "displaystyle": "true"})
