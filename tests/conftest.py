@@ -118,10 +118,12 @@ def pytest_collection_finish(session):
     option = session.config.option
     proofs = find_spec("crossfield.models.proof")  # tests of the core alone do without
     if proofs and session.items and not option.collectonly and not option.markexpr.startswith("smoke"):
+        from crossfield.models.processes.compilation import is_all_compiled
         from crossfield.models.proof.compiling import compile_all
 
         for orthogonal in (False, True):
             compile_all(orthogonal)
+        assert is_all_compiled(), "compile_all leaves functions of proofs out"
 
 
 def pytest_sessionfinish(session):
