@@ -55,7 +55,6 @@ _SETTLED: Final = 4  # spacings after which little is lost where the centre is a
 _PASSES: Final = 3  # passes forwards and backwards between two roundings, which do another one
 _MOST_ROUNDS: Final = 40  # roundings of a level, in case that the bound creeps
 _SLOW: Final = 0.3  # share of the gap that passes must close for a level to go on, if labels do not grow
-_SLOWEST: Final = 0.005  # the same where the finer level would be too large
 _FEW_LABELS: Final = 600_000  # labels of which passes take less time than one more level of the certificate
 _FEW_LEFT: Final = 0.5  # share of more labels that are left, at which passes go on over these only
 _RECORD: Final = 11  # passes that take as long as a record with combs, and two before it
@@ -175,31 +174,25 @@ class Descent:
         centre = self.best
         dual = Dual(self.first_level(_centre_at(centre)), self.crew)
         self.chain = Chain(arrays=dual.lattice.centre_arrays())
-        patient = False  # whether a finer lattice was too large, so that this one has the same spacing
         while True:
             self._add_clusters(dual)
-            rising = self._raise_bound(dual, patient=patient)
+            rising = self._raise_bound(dual)
             left = self._record_level(dual)
             if (reason := self._reason_to_end()) or left is None:
                 return reason or "time"
-            lattice = smaller_lattice(left) if rising and not patient else finer_lattice(left)
+            lattice = smaller_lattice(left) if rising else finer_lattice(left)
             better = self.energy(self.best) < self.energy(centre) * (1 - _MUCH_BETTER)
             if better and len(self.chain.last_of_spacings) <= _SETTLED:
                 return self.ends.reason()
             if _is_too_large(dual, lattice) or not self._has_time_for(dual, lattice):
-                if patient and not rising:
-                    return self.ends.reason() if better else "labels"
-                if self._is_closing(dual):
-                    return self.ends.reason() or "time"
-                lattice = smaller_lattice(left)
-            patient = lattice.h == dual.lattice.h and (patient or not rising)
+                return self.ends.reason() if better else "labels"
             dual.move(lattice)
 
-    def _raise_bound(self, dual: Dual, *, patient: bool) -> bool:
+    def _raise_bound(self, dual: Dual) -> bool:
         """Raise the dual of a level, and round fields from it, until the bound rises slowly.
 
         Returns whether it does not, but the gap has become so small that passes over fewer labels are worth a
-        record. patient: whether to go on while the bound rises at all, because no finer lattice may follow.
+        record.
         """
         rounding, reached, rises = Rounding(dual, self.better_field), -math.inf, [math.inf] * 2
         for _ in range(_MOST_ROUNDS):
@@ -212,7 +205,7 @@ class Descent:
             if self._is_closing(dual) or self._is_exact(bound):
                 break
             left = dual.count_left(bound, energy) / labels
-            if max(rises) <= (_SLOWEST if patient else _slow_rise(left)) and bound >= reached:
+            if max(rises) <= _slow_rise(left) and bound >= reached:
                 break
             if labels > _FEW_LABELS and left <= _FEW_LEFT and self._has_time_for(dual, dual.lattice):
                 return True  # passes over the labels that are left are worth a record of the level
