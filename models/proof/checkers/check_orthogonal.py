@@ -68,6 +68,7 @@ STAGE_PARTS = {  # of charges, with their kinds; the first four have a number fo
     "positive": "|u1", "negative": "|u1", "potential": "<f8", "price": "<f8",
     "start": "<i4", "loop": "<i4", "weight": "<f4",
 }  # fmt: skip
+PRODUCTS = ("particles", "linear", "pairs", "triples", "weight", "apart")  # also, as often as `products` says
 BRANCHES = ("branches", "branch_particles", "branch_shares")  # also, or none of them
 LEVEL_PARTS = ("rings", "shares", "unit", "squares")
 
@@ -90,7 +91,7 @@ class CentredRows:
     less than here, because kappa differs from that of the mesh. memory, taken: most bytes for the check, and
     those that it takes without levels.
 
-    Prescribed indices (Lemma 12) add `constant` to the energy, and shift residuals by shift (r,) on the rows
+    Prescribed indices (Lemma 13) add `constant` to the energy, and shift residuals by shift (r,) on the rows
     of their rings, where is_held (r,) is True. steps (3, t): ring, row and direction along these rings. turns
     (k,): the sums of integers there.
     """
@@ -134,7 +135,7 @@ class CentredRows:
         self.residual = self.residuals(self.centre) + HALF * self.nearest
 
     def _shift_residuals(self, arrays: dict[str, Array]) -> tuple[Array, Array, float]:
-        """Lemma 12: which rows are held, by how much residuals are shifted, and the constant."""
+        """Lemma 13: which rows are held, by how much residuals are shifted, and the constant."""
         (ring, row, sign), size, count = self.steps, len(self.turns), len(self.offset)
         held = np.bincount(row, minlength=count) > 0
         if size == 0:
@@ -794,26 +795,24 @@ def stage_of(charges: Charges, clouds: Clouds, potential: Array, price: Array) -
     return bound, HALF**2 * added, kind
 
 
-class Branches:
-    """Bounds of energies where some particles are there and others are not (Lemma 11).
+class Particles:
+    """Particles that fields may have, one by one, for bounds in units of (pi/2)^2.
 
-    count (c,): particles of each kind. unit (u,): the kind of each, as of `stage_of`; sign (u,). smeared
-    (u, l): what its cloud makes of it, with its sign. alone (u,): what it adds without others or a potential,
-    at least. mutual (u, u): what one adds for another one that is there. never (u, u): whether no field has
-    both. wanted: the sum of signs, if all loops are closed. inverse (l, l): of the Laplacian, about; bounds
-    hold for any.
+    unit (u,): the kind of each, as of `stage_of`; number (u,): which of that kind; sign, loop (u,). wanted:
+    the sum of signs, if all loops are closed. never (u, u): whether no field has both. inverse (l, l): of the
+    Laplacian, about; bounds hold for any.
     """
 
     def __init__(self, charges: Charges, clouds: Clouds, count: Array) -> None:
-        """Prepare bounds for up to so many particles of each kind, count (c,)."""
+        """Take up to so many particles of each kind, count (c,)."""
         size, kinds, rows = charges.size, len(clouds.loop), charges.rows
-        self.charges, self.count, number = charges, count, spans(0 * count, count)
+        self.charges, self.count, self.number = charges, count, spans(0 * count, count)
         self.unit = np.repeat(np.arange(kinds), count)
-        units = np.arange(len(self.unit))
-        fits = len(units) > 0 and max(size, len(units)) <= MOST_BRANCHED
-        base.require(fits, "branches", "have no particles or too many")
-        base.check_room(rows.taken + 8 * (size + len(units)) * (6 * size + 6 * len(units)), rows.memory)
-        self.margin = charges.margin + base.PRECISION * (size + len(units))
+        units = len(self.unit)
+        fits = units > 0 and max(size, units) <= MOST_BRANCHED
+        base.require(fits, "particles", "are none or too many")
+        base.check_room(rows.taken + 8 * (size + units) * (6 * size + 6 * units), rows.memory)
+        self.margin = charges.margin + base.PRECISION * (size + units)
         self.sign, self.loop = clouds.sign[self.unit], clouds.loop[self.unit]
         total = float(charges.origin.sum())
         self.wanted, is_whole = round(total), abs(total - round(total)) < 0.1
@@ -823,6 +822,137 @@ class Branches:
         part = base.parts_of(size, *charges.links)
         joined = (part[:, None] == part) * charges.resistance.mean() / size
         self.inverse = np.linalg.inv(self.laplacian + joined)
+        self.never = (self.sign[:, None] != self.sign) & (self.loop[:, None] == self.loop)
+
+    def prices(self, added: Array, there: Array, free: Array) -> tuple[Array, Array]:
+        """The best multipliers (b,) for the sum of all charges, where that is 0, and whether it may be.
+
+        added (b, u): what particles add, with their signs.
+        """
+        if not self.charges.closed.all():
+            return np.zeros(len(added)), np.ones(len(added), bool)
+        due, count = self.wanted - there @ self.sign + (free & (self.sign < 0)).sum(axis=1), free.sum(axis=1)
+        order = np.sort(np.where(free, added, np.inf), axis=1)
+        best = order[np.arange(len(added)), np.clip(due - 1, 0, np.maximum(count - 1, 0))]
+        return np.where(count > 0, best, 0.0), (due >= 0) & (due <= count)
+
+
+class Products(Particles):
+    """A bound of energies from products of two particles (Lemma 12).
+
+    It is one of fields with other charges than a given one, of energy `least`.
+
+    matrix (u + 1, u + 1): [1 x] matrix [1 x] is at most the energy of the particles x, but for `error`.
+    apart (u + 1, u + 1): the same is positive at the given field alone; None if a particle of it is left out.
+    """
+
+    def __init__(self, charges: Charges, clouds: Clouds, count: Array, given: Array) -> None:
+        """As `Particles`. given (c,): how many particles of each kind the given field has."""
+        super().__init__(charges, clouds, count)
+        green, origin = (self.inverse + self.inverse.T) / 2, charges.origin
+        energy = 2 * green - green @ self.laplacian @ green
+        reach = np.abs(green)
+        reach = 2 * reach + reach @ np.abs(self.laplacian) @ reach
+        far, pull = np.abs(origin) + np.bincount(self.loop, minlength=charges.size), energy @ origin
+        self.error = 4 * float((self.margin * far + charges.error) @ reach @ (1 + far))
+        between = self.sign[:, None] * energy[np.ix_(self.loop, self.loop)] * self.sign
+        cross = -(self.sign * pull[self.loop])[None]
+        self.matrix = np.block([[np.array([[origin @ pull]]), cross], [cross.T, (between + between.T) / 2]])
+        self.sum = np.append(-float(self.wanted), self.sign) if charges.closed.all() else None
+        has, self.apart = self.number < given[self.unit], None
+        here = np.bincount(self.loop, self.sign * has, charges.size) - origin
+        potential = green @ here
+        size = 2 * np.abs(here) + np.abs(self.laplacian) @ np.abs(potential)
+        error = np.abs(potential) @ (self.margin * size + 2 * charges.error)
+        least = 2 * potential @ here - potential @ self.laplacian @ potential - error
+        self.least = HALF**2 * float(least) + charges.rows.constant
+        differ = 1 if self.sum is None else 2 * (self.sum @ np.append(1.0, has) == 0)  # particles, at least
+        if differ and (given <= count).all():
+            self.apart = np.diag(np.append(differ - has.sum(), 2.0 * has - 1))
+
+    def bound(self, dual: Array, triples: Array, weight: Array, apart: float) -> tuple[float, Array]:
+        """A lower bound, and one for fields with each particle, (u,).
+
+        dual (u + 1, u + 1): symmetric. triples (k, 3), weight (k,): triangle inequalities and multipliers.
+        apart: the multiplier of `apart`.
+        """
+        taken, used = self.triangles(triples, weight)
+        if self.apart is not None:
+            taken, used = taken + apart * self.apart, used + apart * float(np.abs(self.apart).sum())
+        rest = self.matrix + taken - dual
+        norm, size = float(np.linalg.norm(rest)), float(np.abs(self.matrix).sum() + np.abs(dual).sum()) + used
+        if self.sum is not None:  # only numbers with that sum count, so any multiple of the last term does
+            unit = self.sum / np.linalg.norm(self.sum)
+            along, square = rest @ unit, np.outer(unit, unit)
+            rest = rest - np.outer(along, unit) - np.outer(unit, along) + (along @ unit + norm) * square
+        lacking = max(0.0, -float(np.linalg.eigvalsh(rest)[0])) + 2 * self.margin * norm
+        added, pairs = np.diag(dual)[1:] + 2 * dual[0, 1:] - lacking, 2 * np.maximum(dual[1:, 1:], 0.0)
+        pairs[self.never | np.eye(len(pairs), dtype=bool)] = 0.0
+        there = np.vstack([np.zeros(len(added), bool), np.eye(len(added), dtype=bool)])
+        first, more, reach = self._tangents(rest + lacking * np.eye(len(rest)), norm)
+        added = added + there @ pairs + more  # to no other particle, and to each one
+        price, fits = self.prices(self.sign * added, there, ~there)
+        pull = added - price[:, None] * self.sign
+        least = (
+            dual[0, 0]
+            - lacking
+            + price * self.wanted
+            + np.where(there, pull, np.minimum(pull, 0.0)).sum(axis=1)
+        )
+        size = size + np.abs(pull).sum(axis=1) + np.abs(price) * (abs(self.wanted) + len(pull)) + reach
+        bounds = least + first - (self.margin + base.PRECISION * len(weight)) * size - self.error
+        base.require(np.isfinite(bounds), "products", "have a bound that is no number")
+        bounds = np.where(fits, HALF**2 * bounds + self.charges.rows.constant, np.inf)
+        return float(bounds[0]), bounds[1:]
+
+    def _tangents(self, matrix: Array, norm: float) -> tuple[Array, Array, Array]:
+        """Tangents of [1 x] matrix [1 x] at the least value with each particle, after one that is 0.
+
+        They are lower bounds, because no value is negative: constants (1 + u,), slopes (1 + u, u), and the
+        size of the numbers.
+        """
+        inverse = np.linalg.inv(matrix + RELATIVE * (1 + norm) * np.eye(len(matrix)))
+        itself, across = np.diag(inverse)[1:], inverse[0, 1:]
+        size = inverse[0, 0] * itself - across * across
+        at = ((itself - across) / size)[:, None] * inverse[0] + ((inverse[0, 0] - across) / size)[
+            :, None
+        ] * inverse[1:]
+        at = np.vstack([np.zeros(len(matrix)), np.where(np.isfinite(at), at, 0.0)])
+        slope, far = at @ matrix, np.abs(at) @ np.abs(matrix)
+        constant = 2 * slope[:, 0] - (slope * at).sum(axis=1)
+        return constant, 2 * slope[:, 1:], 2 * far.sum(axis=1) + (far * np.abs(at)).sum(axis=1)
+
+    def triangles(self, triples: Array, weight: Array) -> tuple[Array, float]:
+        """The matrix of inequalities times multipliers, and the size of the numbers in its sums.
+
+        Of particles a, b, c: ab + ac <= a + bc with a weight that is positive, a + b + c <= 1 + ab + ac + bc
+        with -weight if it is negative.
+        """
+        n, (a, b, c), far = len(self.matrix), 1 + triples.T, weight < 0
+        size, turn = np.abs(weight), np.where(far, -1.0, 1.0)
+        entries = [
+            (a * n + b, size * turn),
+            (a * n + c, size * turn),
+            (b * n + c, -size),
+            (a * n + a, -size * turn),
+        ]
+        entries += [(b * n + b, size * far), (c * n + c, size * far), (0 * a, -size * far)]
+        place, number = (np.concatenate(part) for part in zip(*entries))
+        matrix = np.bincount(place, number, n * n).reshape(n, n)
+        return (matrix + matrix.T) / 2, 7 * float(size.sum())
+
+
+class Branches(Particles):
+    """Bounds of energies where some particles are there and others are not (Lemma 11).
+
+    smeared (u, l): what its cloud makes of a particle, with its sign. alone (u,): what it adds without others
+    or a potential, at least. mutual (u, u): what one adds for another one that is there.
+    """
+
+    def __init__(self, charges: Charges, clouds: Clouds, count: Array) -> None:
+        """As `Particles`."""
+        super().__init__(charges, clouds, count)
+        size, kinds, units = charges.size, len(clouds.loop), np.arange(len(self.unit))
         weight = np.zeros((kinds, size))
         weight[clouds.owner, clouds.cell] = clouds.weight
         self.weight = weight[self.unit]
@@ -833,7 +963,6 @@ class Branches:
         pairs = near + smeared @ self.weight.T - self.margin * (near + reach @ self.weight.T)
         alike = (self.sign[:, None] == self.sign) & (self.unit[:, None] != self.unit)
         pairs = np.where(alike, np.maximum(pairs, 0.0), 0.0)
-        self.never = (self.sign[:, None] != self.sign) & (self.loop[:, None] == self.loop)
         self.mutual, self.smeared = pairs + pairs.T, self.sign[:, None] * smeared
         self.pulled = 2 * self.margin * (1 + 2 * self.weight @ charges.resistance)
         most = clouds.at_home + clouds.size + 2 * np.abs(charges.origin)[clouds.cell]
@@ -841,7 +970,7 @@ class Branches:
             np.bincount(clouds.owner, clouds.weight * numbers, kinds)[self.unit]
             for numbers in (clouds.at_home + clouds.smeared, self.margin * most + 2 * charges.error)
         )
-        self.alone = (itself - error) * (2 * number + 1)
+        self.alone = (itself - error) * (2 * self.number + 1)
 
     def bounds(self, state: Array, shares: Array) -> Array:
         """Lower bounds (b,). state (b, u): 1 for particles that are there, 0 for others, 2 for either.
@@ -854,7 +983,7 @@ class Branches:
         pull = potential[:, self.loop] - (origin + laplace) @ self.weight.T
         mutual = there @ self.mutual
         added = self.alone + 2 * self.sign * pull - far[:, None] * self.pulled + mutual
-        price, fits = self._prices(self.sign * added, there, free)
+        price, fits = self.prices(self.sign * added, there, free)
         fits &= ((there @ self.never) * there == 0).all(axis=1)
         size = (np.abs(added) + mutual).sum(axis=1)
         size += np.abs(price) * (len(self.unit) + len(origin) + np.abs(origin).sum())
@@ -866,18 +995,6 @@ class Branches:
         bounds = least - (self.margin + 2 * self.charges.error) * size
         base.require(np.isfinite(bounds), "branches", "have a bound that is no number")
         return np.where(fits, HALF**2 * bounds + self.charges.rows.constant, np.inf)
-
-    def _prices(self, added: Array, there: Array, free: Array) -> tuple[Array, Array]:
-        """The best multipliers (b,) for the sum of all charges, where that is 0, and whether it may be.
-
-        added (b, u): what particles add, with their signs.
-        """
-        if not self.charges.closed.all():
-            return np.zeros(len(added)), np.ones(len(added), bool)
-        due, count = self.wanted - there @ self.sign + (free & (self.sign < 0)).sum(axis=1), free.sum(axis=1)
-        order = np.sort(np.where(free, added, np.inf), axis=1)
-        best = order[np.arange(len(added)), np.clip(due - 1, 0, np.maximum(count - 1, 0))]
-        return np.where(count > 0, best, 0.0), (due >= 0) & (due <= count)
 
 
 def states_of(tree: Array, units: int) -> Array:
@@ -919,11 +1036,66 @@ def charges_bound(arrays: dict[str, Array], rows: CentredRows, threshold: float)
     if "loop_start" not in arrays:
         return 0.0
     best, charges, clouds, count = stages_bound(arrays, rows, threshold)
-    if "branches" in arrays:
-        particles = base.take_array(arrays, "branch_particles", "|u1", len(count)).astype(np.int64)
-        base.require(particles >= count, "branch_particles", "leaves out a particle")
-        best = max(best, branches_bound(arrays, Branches(charges, clouds, particles)))
-    return best
+
+    def particles(name: str) -> Array:
+        stored = base.take_array(arrays, name, "|u1", len(count)).astype(np.int64)
+        base.require(stored >= count, name, "leaves out a particle")
+        return stored
+
+    rounds, bounds, rest = products_count(arrays), [best], math.inf
+    given = base.take_array(arrays, "products_given", "|u1", len(count)).astype(int) if rounds else count
+    for number in range(rounds):
+        products = Products(charges, clouds, particles(f"products_{number}_particles"), given)
+        rest = min(rest, products.least if products.apart is not None else math.inf)
+        bound, count = products_bound(arrays, number, products, threshold)
+        bounds.append(bound)
+    if "branches" in arrays:  # after products, they need not have the given charges
+        bounds.append(branches_bound(arrays, Branches(charges, clouds, particles("branch_particles"))))
+    return max(best, min(rest, max(bounds)))
+
+
+def products_bound(
+    arrays: dict[str, Array], number: int, products: Products, threshold: float
+) -> tuple[float, Array]:
+    """A bound from products, and how many particles of each kind fields of at most that energy have."""
+    units, prefix = len(products.unit), f"products_{number}_"
+    linear = base.take_array(arrays, prefix + "linear", "<f8", 2, units + 1)
+    pairs = base.take_array(arrays, prefix + "pairs", "<f4", units * (units - 1) // 2).astype(float)
+    triples = base.take_array(arrays, prefix + "triples", "<u2", None, 3).astype(np.int64)
+    weight = base.take_array(arrays, prefix + "weight", "<f4", len(triples)).astype(float)
+    apart = base.take_array(arrays, prefix + "apart", "<f8", 1)
+    for name, numbers in (("linear", linear), ("pairs", pairs), ("weight", weight), ("apart", apart)):
+        base.require(np.abs(numbers) <= MOST_NUMBER, prefix + name, "is too large")
+    one, other, third = np.sort(triples, axis=1).T
+    wrong = (one == other) | (other == third) | (third >= units)
+    base.require(~wrong, prefix + "triples", "are not of three particles")
+    base.check_room(
+        products.charges.rows.taken + 100 * (units * units + len(triples)), products.charges.rows.memory
+    )
+    upper = np.triu_indices(units, 1)
+    base.require((pairs >= 0) | products.never[upper], prefix + "pairs", "is negative")
+    base.require(apart >= 0, prefix + "apart", "is negative")
+    bound, with_each = products.bound(dual_of(linear, pairs), triples, weight, float(apart[0]))
+    left = np.bincount(products.unit, with_each <= threshold, len(products.count))
+    return bound, left.astype(np.int64)
+
+
+def dual_of(linear: Array, pairs: Array) -> Array:
+    """The symmetric matrix with that first row and diagonal, and those entries above it."""
+    units = linear.shape[1] - 1
+    dual = np.zeros((units + 1, units + 1))
+    dual[1:, 1:][np.triu_indices(units, 1)] = pairs
+    dual[0, 1:] = linear[0, 1:]
+    dual += dual.T
+    np.fill_diagonal(dual, linear[1])
+    return dual
+
+
+def products_count(arrays: dict[str, Array]) -> int:
+    """How often products bound the energy."""
+    count = int(base.take_array(arrays, "products", "<i4", 1)[0]) if "products" in arrays else 0
+    base.require(0 <= count <= MOST_STAGES, "products", "are too many")
+    return count
 
 
 def stages_bound(
@@ -1022,6 +1194,8 @@ def check_names(arrays: dict[str, Array], levels: int) -> None:
     if "loop_start" in arrays:
         stages = range(stage_count(arrays))
         more |= {*LOOPS} | {f"stage_{number}_{part}" for number in stages for part in STAGE_PARTS}
+        more |= {f"products_{number}_{part}" for number in range(products_count(arrays)) for part in PRODUCTS}
+        more |= {"products", "products_given"} if "products" in arrays else set()
         more |= {*BRANCHES} if "branches" in arrays else set()
     base.compare_names(arrays, {*PARTS, *of_domain, *more}, LEVEL_PARTS, levels)
 

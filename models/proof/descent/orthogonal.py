@@ -3,7 +3,8 @@
 docs/orthogonal-proofs.md has the lemmas. On every level a dual rises (orthogonal_dual.py), a field is rounded
 from it, and the checker (check_orthogonal.py) computes the bound and what is left. The next level has a third
 of the spacing, or the same with fewer labels. Rings that hold part of the gap become clusters. Where many
-points have no stroke, charges (charges.py) and branches on them (branches.py) give a first bound.
+points have no stroke, charges (charges.py), their products (products.py) and branches (branches.py) give a
+first bound.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from ...search.integer_search import IntegerSearch
 from ..bound.branches import branch_arrays
 from ..bound.charges import charge_arrays
 from ..bound.orthogonal_dual import RingDual, update_rings
+from ..bound.products import products_arrays
 from ..checkers import check_orthogonal as checker
 from ..checkers.check_certificate import OPTIMAL
 from ..checkers.check_orthogonal import CellLevel, CentredRows
@@ -61,7 +63,10 @@ _LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one, and
 _STARTS: Final = 0.3  # of the time, after which no start is rounded with care
 _CHARGES: Final = 0.5  # of the time, which charges leave
 _MANY_FREE: Final = 400  # points without strokes above which levels exclude little, and charges are tried
-_CLOSED: Final = 0.05  # relative gap of charges below which branches take the time of levels
+_CLOSED: Final = (
+    0.05  # relative gap of charges below which branches take the time of levels; products: _LOOSE
+)
+_WORTH: Final = 0.5  # of the energy: what clouds prove where products pay, unless all loops are closed
 _LOOK: Final = 1e-4  # seconds per point of a first look at charges, and of its check, where points are many
 _PULL: Final = 1e-9  # relative: makes the matrix of prescribed rings of a closed part definite
 _TUNING: Final = 0.1  # of the time, in which the multipliers of prescribed sums rise
@@ -220,47 +225,93 @@ class _Prover:
             if not quick and ends.is_over(later + self.look):
                 break
             chain, rows = self._begin_chain()
-            took = clock() - begin
+            took, least = clock() - begin, self.least
             ahead = took if quick else max(later, self.proven.seconds)
             is_over = (lambda: ends.is_over(ahead)) if many or not quick else never  # noqa: B023
             # One look shows whether a search pays first.
             arrays = charge_arrays(self.instance.domain, rows, chain.threshold, is_over, quick=quick)
             if arrays and not quick:
                 arrays |= self._branch(arrays, rows, chain.threshold, ahead)
-            checking = clock()
-            bound = checker.charges_bound(arrays, rows, chain.threshold)
-            self.charged = math.inf if quick and arrays else self.least
-            self.look = clock() - begin
-            if bound > self.charges:
-                before = chain.arrays.keys() - self.of_charges.keys()
-                chain.arrays = {name: chain.arrays[name] for name in sorted(before)} | arrays
-                self.charges, self.of_charges, chain.convex = bound, arrays, bound
-                chain.seconds = took + clock() - checking
-                self.proven = max(chain, self.proven, key=lambda chain: chain.bound)
-                self.progress(f"energy {self.least:.5g}, bound {bound:.5g}, charges")
+            self._keep_charges(chain, arrays, rows, took)
+            self.charged, self.look = math.inf if quick and arrays else least, clock() - begin
             if self.charges > 0 and (reason := self._reason_to_end(self.proven)):
                 return reason
             if self.least - self.charges < _LOOSE * self.least:
                 self._search_if_due()
+            if arrays and not quick and self.least == least:
+                self._keep_charges(chain, self._multiply(arrays, rows, chain.threshold, ahead), rows, took)
+                if reason := self._reason_to_end(self.proven):
+                    return reason
             quick = False
         return ""
+
+    def _keep_charges(self, chain: _TimedChain, arrays: Arrays, rows: CentredRows, took: float) -> None:
+        """Take a bound by charges into a chain without levels, if it is the best one.
+
+        took: seconds that the rows took.
+        """
+        checking = self.ends.deadline.clock()
+        bound = checker.charges_bound(arrays, rows, chain.threshold)
+        if bound > self.charges:
+            before = chain.arrays.keys() - self.of_charges.keys()
+            chain.arrays = {name: chain.arrays[name] for name in sorted(before)} | arrays
+            self.charges, self.of_charges, chain.convex = bound, arrays, bound
+            chain.seconds = took + self.ends.deadline.clock() - checking
+            self.proven = max(chain, self.proven, key=lambda chain: chain.bound)
+            self.progress(f"energy {self.least:.5g}, bound {bound:.5g}, charges")
+
+    def _is_over(self, bound: float, ahead: float, part: float) -> bool:
+        """Whether only seconds for what follows are left, or for the check if less than a part lacks."""
+        close = self.least - bound < part * self.least
+        return self.ends.is_over(self.proven.seconds if close else ahead)
 
     def _branch(self, arrays: Arrays, rows: CentredRows, threshold: float, ahead: float) -> Arrays:
         """The arrays of branches, and a better field if they show one. ahead: seconds for what follows."""
         bound, charges, clouds, count = checker.stages_bound(arrays, rows, threshold)
         if self.least - bound <= OPTIMAL / 2 * max(1.0, self.least):
             return {}
-        if self.least - bound < _CLOSED * self.least:  # no level proves as much
-            ahead = self.proven.seconds
         branches, better = branch_arrays(
-            charges, clouds, count, threshold, lambda seconds: self.ends.is_over(ahead + seconds)
+            charges, clouds, count, threshold, lambda seconds: self._is_over(bound, ahead + seconds, _CLOSED)
         )
-        if better is not None and self.energy.sums is None:
-            parts = arrays["loop_sign"], arrays["loop_row"], arrays["loop_start"]
-            walks = csr_array(parts, shape=(len(better), len(self.z)))
-            z = self.energy.with_charges(self.z, walks, better)
-            self._offer(self.energy.descend(z, is_over=self.ends.is_over))
+        self._offer_charges(arrays, better)
         return branches
+
+    def _multiply(self, arrays: Arrays, rows: CentredRows, threshold: float, ahead: float) -> Arrays:
+        """The arrays of charges with products of particles, and branches on those that are left.
+
+        They may show a better field, too. ahead: as of `_branch`.
+        """
+        stages = {name: array for name, array in arrays.items() if name not in checker.BRANCHES}
+        bound, charges, clouds, count = checker.stages_bound(stages, rows, threshold)
+        if not charges.closed.all() and bound < _WORTH * self.least:
+            return arrays
+        walks = arrays["loop_sign"] * (rows.residual - rows.shift)[arrays["loop_row"]] / HALF
+        products, count, better = products_arrays(
+            charges, clouds, count, np.add.reduceat(walks, arrays["loop_start"][:-1]),
+            threshold=threshold, is_over=lambda bound: self._is_over(max(bound, self.charges), ahead, _LOOSE),
+        )  # fmt: skip
+        stages |= products
+        bound = checker.charges_bound(stages, rows, threshold)
+        if bound > self.charges:
+            branches, other = branch_arrays(
+                charges,
+                clouds,
+                count,
+                threshold,
+                lambda seconds: self._is_over(bound, ahead + seconds, _CLOSED),
+            )
+            self._offer_charges(arrays, other)
+            stages |= branches
+        self._offer_charges(arrays, better)
+        return stages
+
+    def _offer_charges(self, arrays: Arrays, charges: Floats | None) -> None:
+        """Offer a field with these charges of loops, if there are any."""
+        if charges is not None and self.energy.sums is None:
+            parts = arrays["loop_sign"], arrays["loop_row"], arrays["loop_start"]
+            walks = csr_array(parts, shape=(len(charges), len(self.z)))
+            z = self.energy.with_charges(self.z, walks, charges)
+            self._offer(self.energy.descend(z, is_over=self.ends.is_over))
 
     def _leave_out(self, what: str) -> None:
         """Add to the reason what is left out."""

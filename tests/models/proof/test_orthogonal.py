@@ -13,7 +13,7 @@ import pytest
 from certificate_arrays import with_head
 from crossfield.models.orthogonal.energy import OrthogonalEnergy, integers_of
 from crossfield.models.processes.deadline import Deadline, never, silent
-from crossfield.models.proof.bound import charges
+from crossfield.models.proof.bound import charges, products
 from crossfield.models.proof.bound.charges import charge_arrays
 from crossfield.models.proof.certificate import check_proof
 from crossfield.models.proof.checkers import check_orthogonal as checker
@@ -143,31 +143,64 @@ def test_charges_of_parts_strokes_and_weights_do_not_exceed_the_optimum(seed, ki
     assert admits_charges(arrays, instance, z)
 
 
-@pytest.mark.parametrize("mesh", [random_hull(3, 10), random_hull(1, 6, (1, 1, 5)), torus_of_seven()])
-def test_no_branch_has_a_bound_above_the_energies_of_its_charges(mesh):
-    rng = np.random.default_rng(0)
+MESHES = [random_hull(3, 10), random_hull(1, 6, (1, 1, 5)), torus_of_seven()]
+
+
+def all_charges(mesh, rng):
+    """What bounds of particles are made of, all choices of particles, and their energies."""
     instance = strokeless(mesh, pair_weights=rng.uniform(0.2, 5, len(mesh.first)))
     rows = checker.CentredRows(prove_from(instance, 0 * mesh.first, levels=1).certificate())
     arrays = charge_arrays(mesh, rows, 99.0, never)
     _, charges, clouds, count = checker.stages_bound(arrays, rows, 99.0)
-    branches, walks = checker.Branches(charges, clouds, count), matrix_of_loops(arrays, len(rows.weight))
-    places = branches.sign[:, None] * np.eye(charges.size)[branches.loop]
+    particles, walks = checker.Particles(charges, clouds, count), matrix_of_loops(arrays, len(rows.weight))
+    places = particles.sign[:, None] * np.eye(charges.size)[particles.loop]
     there = np.array([*itertools.product((0, 1), repeat=len(places))])
     sums, alone = there @ places - charges.origin, there @ np.abs(places) == np.abs(there @ places)
     possible = (np.abs(sums.sum(axis=1)) < 0.1) & alone.all(axis=1)  # charges of a loop have one sign
     there, sums, form = there[possible], sums[possible], np.linalg.pinv((walks / rows.weight) @ walks.T)
     energies = np.pi**2 / 4 * np.einsum("kv,vw,kw->k", sums, form, sums, optimize=True)
-    states = rng.choice([0, 1, 2], p=[0.2, 0.2, 0.6], size=(300, len(places)))
-    bounds = branches.bounds(states, rng.random(states.shape))
+    return (charges, clouds, count), there, sums, energies
+
+
+@pytest.mark.parametrize("mesh", MESHES)
+def test_no_branch_has_a_bound_above_the_energies_of_its_charges(mesh):
+    rng = np.random.default_rng(0)
+    parts, there, _, energies = all_charges(mesh, rng)
+    states = rng.choice([0, 1, 2], p=[0.2, 0.2, 0.6], size=(300, there.shape[1]))
+    bounds = checker.Branches(*parts).bounds(states, rng.random(states.shape))
     members = ((states[:, None] == there) | (states[:, None] == 2)).all(axis=2)
     assert (bounds <= np.where(members, energies, np.inf).min(axis=1) + 1e-9).all()
     assert members.any(axis=1).sum() > 50
 
 
-@pytest.mark.parametrize("points", [10, 20, 40])
-def test_branches_prove_optima_of_closed_surfaces(points):
+@pytest.mark.parametrize("noise", [0, 1e-3, 1])
+@pytest.mark.parametrize("mesh", MESHES[::2])
+def test_no_products_have_a_bound_above_the_energies_of_other_charges(mesh, noise, monkeypatch):
+    monkeypatch.setattr(products, "_FEW", 1)
+    rng = np.random.default_rng(1)
+    parts, there, sums, energies = all_charges(mesh, rng)
+    first, looks = energies.argmin(), itertools.count()
+    options = {"threshold": 99.0, "is_over": lambda _: next(looks) > 500}
+    arrays, _, _ = products.products_arrays(*parts, sums[first], **options)
+    linear, pairs, triples, weight, (more,) = (arrays[f"products_0_{part}"] for part in checker.PRODUCTS[1:])
+    linear, pairs = linear + noise * rng.normal(size=linear.shape), pairs + noise * rng.random(len(pairs))
+    of = checker.Products(*parts, arrays["products_given"].astype(int))
+    assert of.least == pytest.approx(energies[first])
+    bound, with_each = of.bound(
+        checker.dual_of(linear, pairs), triples.astype(int), weight * (1 + noise), more + noise
+    )
+    others, kept = np.delete(energies, first), np.delete(there, first, axis=0)
+    assert bound <= others.min() + 1e-9
+    assert noise or bound > 0.9 * others.min()
+    assert (with_each <= np.where(kept.T, others, np.inf).min(axis=1) + 1e-9).all()
+
+
+@pytest.mark.parametrize("points, way", [(10, "branches"), (40, "branches"), (40, "products")])
+def test_particles_prove_optima_of_closed_surfaces(points, way, monkeypatch):
+    if way == "products":
+        monkeypatch.setattr(orthogonal, "branch_arrays", lambda *_: ({}, None))
     proof = cf.prove(strokeless(random_hull(points, points)), jobs=1)
-    assert (proof.status, proof.levels, "branches" in proof.arrays) == ("optimal", (), True)
+    assert (proof.status, proof.levels, way in proof.arrays) == ("optimal", (), True)
 
 
 def test_charges_do_not_exceed_the_optimum_of_a_torus():

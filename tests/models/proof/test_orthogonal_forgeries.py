@@ -11,6 +11,7 @@ from certificate_arrays import claiming, of_instance, with_array, with_entry, wi
 from crossfield.models.orthogonal.energy import OrthogonalEnergy
 from crossfield.models.proof.checkers import check_orthogonal as checker
 from crossfield.models.proof.checkers.check_certificate import NotProvenError, UnreadableError
+from crossfield.models.proof.descent import orthogonal
 from meshes import torus
 from orthogonal_certificates import certificate_at, shares_of_star, star
 from small_meshes import fan, random_hull, random_instance, strokeless, try_all_integers
@@ -289,14 +290,32 @@ BROKEN_BRANCHES = [
     ("by a particle twice", lambda a: with_tree(a, [99])),
     ("branch_particles leaves out", lambda a: a | {"branch_particles": 0 * a["branch_particles"]}),
     ("branch_shares", lambda a: a | {"branch_shares": a["branch_shares"][:, 1:]}),
-    ("branch_shares", lambda a: {name: array for name, array in a.items() if name != "branch_shares"}),
+]
+
+
+BROKEN_PRODUCTS = [
+    ("pairs is negative", with_entry("products_0_pairs", 0, -1.0)),
+    ("pairs is too large", with_entry("products_0_pairs", 0, 1e35)),
+    ("apart is negative", with_entry("products_0_apart", 0, -1.0)),
+    ("triples are not of three", with_entry("products_0_triples", 0, 999)),
+    ("particles leaves out", lambda a: a | {"products_1_particles": 0 * a["products_1_particles"]}),
+    ("leaves out a particle", with_entry("products_0_linear", 1, 99.0)),
+    ("is proven", lambda a: a | {"products_given": 0 * a["products_given"]}),
+    ("products", lambda a: a | {"products": np.array([3], np.int32)}),
 ]
 
 
 @pytest.mark.parametrize(
-    "mesh, gap, broken", [(torus(12, 6), 0.9, BROKEN_CHARGES), (random_hull(1, 20), 0.0, BROKEN_BRANCHES)]
+    "mesh, gap, broken",
+    [
+        (torus(12, 6), 0.9, BROKEN_CHARGES),
+        (random_hull(20, 20), 0.0, BROKEN_BRANCHES),
+        (random_hull(40, 40), 0.0, BROKEN_PRODUCTS),
+    ],
 )
-def test_each_broken_assumption_about_charges_is_refused_by_name(mesh, gap, broken, subtests):
+def test_each_broken_assumption_about_charges_is_refused_by_name(mesh, gap, broken, subtests, monkeypatch):
+    if broken is BROKEN_PRODUCTS:
+        monkeypatch.setattr(orthogonal, "branch_arrays", lambda *_: ({}, None))
     sound = cf.prove(strokeless(mesh), limits=cf.Limits(gap=gap), jobs=1).certificate()
     assert checker.check_arrays(sound).bound > 0
     for number, (message, change) in enumerate(broken):
