@@ -16,7 +16,7 @@ import pytest
 from command_line import invoke
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.proof.checkers import check_certificate
-from crossfield.models.proof.descent import descent, orthogonal
+from crossfield.models.proof.descent import orthogonal
 from exhaustive import exact, random_instance, sketch
 from instance_kinds import kind
 from small_drawings import read, svg
@@ -260,19 +260,3 @@ def test_ctrl_c_ends_a_proof_with_the_levels_that_are_checked(name, size, words,
         assert (read.bound, read.gap, read.forced) == (proof.bound, proof.gap, proof.forced)
     else:
         assert proof.bound == 0.0
-
-
-@pytest.mark.slow
-def test_where_no_finer_level_fits_a_smaller_one_raises_the_bound(monkeypatch, tmp_path):
-    """The bound rises once more on the labels that are left, and the certificate has one more level."""
-    instance = cf.sample("ring", 12)
-    monkeypatch.setattr(descent, "MOST_LABELS", 30_000)
-    proof = cf.prove(instance, jobs=1)
-    assert proof.ended == "labels"
-    assert [round(np.pi / 2 / level.h) for level in proof.levels] == [16, 32, 32]
-    before, last = proof.levels[-2:]
-    assert last.size < before.size
-    assert last.bound > before.bound
-    # The checker has the best shares of later pixels, so it may prove more than the rounded ones.
-    assert last.bound * (1 - 1e-5) <= proof.bound <= proof.energy
-    assert cf.write_certificate(proof, tmp_path / "it.npz").bound == proof.bound
