@@ -240,7 +240,7 @@ class _Prover:
                 self._search_if_due()
             if arrays and not quick and self.least == least:
                 self._keep_charges(chain, self._multiply(arrays, rows, chain.threshold, ahead), rows, took)
-                if reason := self._reason_to_end(self.proven):
+                if self.charges > 0 and (reason := self._reason_to_end(self.proven)):
                     return reason
             quick = False
         return ""
