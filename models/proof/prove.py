@@ -50,8 +50,8 @@ def prove(
 
     Orthogonal crosses, on any domain, have a proof of their own, on one thread. It has the same properties.
     With a time limit, a level is begun only if its check is expected to end in time. On surfaces with few
-    strokes, charges give a first bound in about half of the time at most, or in all of it if the gap is below
-    5 % then. Up to 6,000 points without such a bound, the coarsest level is completed under any time limit,
+    strokes, charges give a first bound in about half of the time at most, or in all of it if they prove 80 %
+    then. Up to 6,000 points without such a bound, the coarsest level is completed under any time limit,
     so there is a certificate.
 
     The checker of certificates checks the levels at the end, after the time limit; for orthogonal crosses

@@ -35,6 +35,8 @@ cf.formulate(instance, "milp", stroke_norm="2")          | stroke_norm is 2; giv
 cf.formulate(instance, "milp", beta_norm=3)              | beta_norm is 3; give 1 or 2
 cf.formulate(instance, "milp", facet=3)                  | no facet 3; choose one of hull
 cf.formulate(instance, "milo")                           | ; choose one of minlp-parity
+cf.formulate(instance, "MILP")                           | (is it milp?)
+cf.formulate(instance, "zzz")                            | in short parity, quartic, cubic, bilin, bilin1
 cf.formulate(instance, "milp", norm=1)                   | no option 'norm'
 cf.formulate(instance, "cubic", facet="printed")         | minlp-cubic has no option facet
 cf.formulate(instance, "qp", relax=True)                 | qp-fixed has no option relax
@@ -47,13 +49,14 @@ cf.formulate(right.with_gauge("box"), "miqp-cycle")      | the gauge box does no
 cf.formulate(right.with_gauge("box"), "miqp-orthogonal", limits=True) | the gauge box does not at strokes
 cf.formulate(instance, "parity").lifted                  | minlp-parity has cosines
 problem.objective_value([1])                             | point has shape (1,)
-problem.field([1])                                       | point has shape (1,)
 problem.violation("a")                                   | point holds something other than numbers
+problem.field([1])                                       | point has shape (1,)
 cf.read_sketch("mouse.svg", curvature="colour=red")      | 'c' chooses no strokes; write colour=red
 cf.read_sketch("no such file", size=4097)                | size is 4097; choose 1 to 4096
 cf.sample("sphere")                                      | no sample 'sphere'; choose one of
 cf.sample("torus_patch", 16, silhouette="outer")         | computed, not drawn; choose the silhouette none
 cf.sample("mouse", 6, stroke_weight=np.nan)              | stroke_weight is nan; it must be between 0 and
+cf.analytic("cone", -1)                                  | size is -1; choose 1 to
 cf.analytic("sphere")                                    | no surface 'sphere'; choose one of
 cf.random_instance(-1)                                   | seed is -1; choose 0 to
 cf.random_instance(1, share=0.0)                         | share is 0.0; choose a number above 0
@@ -83,6 +86,7 @@ cf.Instance.on_pixels("a", **pixel | {"stroke_pixels": [[0, 0.5]]}) | stroke_pix
 cf.Instance.on_pixels("a", **pixel, origin=3)                      | origin has shape ()
 cf.Instance.on_pixels("a", **pixel, gauge=["box"])       | no gauge ['box']; choose one of strokes, box
 cf.entries("cf_skew_n008_exact", "cf_skew_n008_mlip")    | has no entry 'cf_skew_n008_mlip'; is it
+cf.entries("x")                                          | crossfield.entries() lists them
 cf.entries(rung=3)                                       | there is no rung 3; choose one of tiny
 cf.surface(field, flip="no")                             | flip is 'no'; give True or False
 cf.surface(field, [cf.Hint(-1, 3, 0.1, 0)])              | row -1, column 3 lies outside the mask of mouse
@@ -90,6 +94,7 @@ cf.surface(field, [cf.Hint(0, 0, 0.1, 0)])               | row 0, column 0 lies 
 cf.surface(field, [cf.Hint(2, 2, np.nan, 0)])            | slant of nan degrees
 cf.surface(field, [cf.Hint(2, 2, 0.1, np.inf)])          | tilt inf, not a direction
 cf.write_all(instance, folder, formats="lp")             | there is no format 'l'; choose one of nl
+cf.write_all(instance, folder, formulations="qp")        | there is no formulation 'q'
 cf.Instance.on_pixels("a", **pixel, orthogonal="no")      | orthogonal is 'no'; give True or False
 cf.Mesh(None, [[0, 1, 2]])                               | vertices holds something other than numbers
 cf.read_mesh(folder / "a.obj", boundary="no")            | boundary is 'no'; give True or False

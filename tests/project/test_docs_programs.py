@@ -3,10 +3,13 @@
 import pytest
 from places import ROOT
 
-NEEDS = {"command_pages": "sphinx", "conf": "sphinx", "csv_pages": "sphinx", "studio_pictures": "selenium"}
+NEEDS = dict.fromkeys(("command_pages", "conf", "csv_pages"), "sphinx")
+NEEDS |= {"formulas": "latex2mathml", "studio_pictures": "selenium"}
+"""Packages of the extra `docs` that a program needs."""
 
 
 @pytest.mark.parametrize("name", sorted(path.stem for path in (ROOT / "docs").glob("*.py")))
 def test_every_program_can_be_imported(docs_module, name):
-    pytest.importorskip(NEEDS.get(name, "latex2mathml" if name == "formulas" else "numpy"))
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name])
     docs_module(name)

@@ -1,8 +1,9 @@
 """Bounds from products of two particles: docs/orthogonal-proofs.md, Lemma 12.
 
 The numbers are those of a semidefinite program, by the alternating direction method of multipliers on its
-products (Oliveira, Wolkowicz and Xu 2018) and by steps of Condat (2013) for triangle inequalities, which are
-added where products violate them. The checker computes all bounds anew, so nothing here has to be exact.
+products (Oliveira, Wolkowicz and Xu 2018), and by primal-dual steps (Pock and Chambolle 2011) for triangle
+inequalities, which are added where products violate them. The checker computes all bounds anew, so nothing
+here has to be exact.
 """
 
 from __future__ import annotations
@@ -15,9 +16,15 @@ from scipy.sparse import csr_array
 
 from ...array_archive import Arrays
 from ...instance.domain import Floats, Ints
-from ..checkers.check_orthogonal import MOST_STAGES, PRODUCTS, Charges, Clouds, Products, dual_of
-
-IsEnough = Callable[[float], bool]
+from ..checkers.check_orthogonal import (
+    MOST_STAGES,
+    PRODUCTS,
+    Charges,
+    Clouds,
+    Products,
+    dual_of,
+    triangle_terms,
+)
 
 _MOST_UNITS: Final = 500  # particles: an iteration with more takes a quarter of a second
 _MOST_LOOPS: Final = 1500  # the same for the matrices of loops, which take two seconds
@@ -35,23 +42,30 @@ _FEW: Final = 12  # particles that branches divide faster
 
 
 def products_arrays(
-    charges: Charges, clouds: Clouds, count: Ints, best: Floats, *, threshold: float, is_over: IsEnough
+    charges: Charges,
+    clouds: Clouds,
+    count: Ints,
+    best: Floats,
+    *,
+    threshold: float,
+    is_over: Callable[[float], bool],
 ) -> tuple[Arrays, Ints, Floats | None]:
     """The arrays of products in a certificate, how many particles of each kind are left, and charges (l,).
 
-    Too many loops or particles have none. The charges, of the likeliest particles, may be those of a better
-    field. clouds, count (c,): of the last stage, and how many particles it leaves. best (l,): charges of the
-    best field, in quarter turns. threshold: as of `Proof`. is_over: whether to end, for a bound.
+    There are no arrays with too many loops or particles. The charges are those of the likeliest particles,
+    in quarter turns: a better field may have them. clouds, count (c,): of the last stage, and how many
+    particles of each kind it leaves. best (l,): charges of the best field. threshold: as of `Proof`. is_over:
+    whether to end, for the bound so far.
     """
     has = np.round(best + charges.origin).astype(np.int64)
-    given = np.maximum(clouds.sign * has[clouds.loop], 0)
-    arrays, program, bound = {"products_given": given.astype(np.uint8)}, None, 0.0
+    known = np.maximum(clouds.sign * has[clouds.loop], 0)
+    arrays, program, bound = {"products_known": known.astype(np.uint8)}, None, 0.0
     for number in range(MOST_STAGES):
         if not _FEW < count.sum() <= _MOST_UNITS or charges.size > _MOST_LOOPS or is_over(bound):
             break
-        program, before = _Program(Products(charges, clouds, count, given), program), count.sum()
-        found, bound, count = program.run(threshold, is_over)
-        arrays |= {f"products_{number}_{part}": array for part, array in zip(PRODUCTS, found, strict=True)}
+        program, before = _Program(Products(charges, clouds, count, known), program), count.sum()
+        parts, bound, count = program.run(threshold, is_over)
+        arrays |= {f"products_{number}_{part}": array for part, array in zip(PRODUCTS, parts, strict=True)}
         arrays["products"] = np.array([number + 1], np.int32)
         if bound >= threshold or count.sum() > _FEWER * before:
             break
@@ -107,7 +121,7 @@ class _Program:
         left = (cuts >= 0).all(axis=1)
         self.cuts, self.weight = cuts[left], before.weight[left]
 
-    def run(self, threshold: float, is_over: IsEnough) -> tuple[list[Any], float, Ints]:
+    def run(self, threshold: float, is_over: Callable[[float], bool]) -> tuple[list[Any], float, Ints]:
         """The arrays of the best bound, that bound, and how many particles of each kind it leaves."""
         best, bound, left, lacking = list[Any](), -np.inf, self.of.count, [np.inf]
         while True:
@@ -115,9 +129,9 @@ class _Program:
                 self._iterate()
                 if is_over(bound):
                     break
-            found, arrays = self._arrays()
-            if found[0] > bound or not best:
-                (bound, with_each), best = found, arrays
+            now, with_each, parts = self._bound()
+            if now > bound or not best:
+                bound, best = now, parts
                 left = np.bincount(self.of.unit, with_each <= threshold, len(self.of.count)).astype(np.int64)
             lacking.append(threshold - bound)
             if left.sum() <= _FEWER * self.of.count.sum() or bound >= threshold or is_over(bound):
@@ -150,7 +164,8 @@ class _Program:
         one = (np.diag(wanted)[1:] + wanted[0, 1:] + wanted[1:, 0]) / heavy
         if self.of.apart is not None:
             one, self.apart = _apart(one, self.penalty * heavy, np.diag(self.of.apart))
-        means[0, 0], means[0, 1:], means[1:, 0] = 1.0, np.clip(one, 0.0, 1.0), np.clip(one, 0.0, 1.0)
+        means[0, 0], means[0, 1:] = 1.0, np.clip(one, 0.0, 1.0)
+        means[1:, 0] = means[0, 1:]
         np.fill_diagonal(means[1:, 1:], means[0, 1:])
         means[1:, 1:][self.of.never] = 0.0
         if len(self.cuts):
@@ -171,16 +186,11 @@ class _Program:
         self.cuts, first = np.unique(np.concatenate([self.cuts[kept], cuts]), axis=0, return_index=True)
         self.weight = np.append(self.weight[kept], np.zeros(len(cuts)))[first]
         size, number = len(self.means), np.arange(len(self.cuts))
-        far, (a, b, c) = self.cuts[:, 0] == 1, 1 + self.cuts[:, 1:].T
-        turn, zero = np.where(far, -1.0, 1.0), 0 * a
-        places = [(a, b, turn), (a, c, turn), (b, c, -1 + 0 * turn), (a, a, -turn)]
-        places += [(b, b, 1.0 * far), (c, c, 1.0 * far), (zero, zero, -1.0 * far)]
-        entries = np.concatenate([part for _, _, part in places])
-        column = np.concatenate([one * size + other for one, other, _ in places])
-        shape = len(self.cuts), size * size
-        self.rows = csr_array((entries, (np.tile(number, len(places)), column)), shape=shape)
+        places, factors = triangle_terms(size, self.cuts[:, 1:], self.cuts[:, 0] == 1)
+        entries = factors.ravel(), (np.tile(number, len(places)), places.ravel())
+        self.rows = csr_array(entries, shape=(len(number), size * size))
         uses = np.asarray(abs(self.rows).sum(axis=0)).reshape(size, size)
-        self.inertia = _INERTIA * (uses + uses.T) / (1 + (np.eye(size) == 0))
+        self.inertia = _INERTIA * (uses + uses.T) / (2 - np.eye(size))
         self.length = _INERTIA / np.maximum(abs(self.rows).sum(axis=1), 1.0)
         self.over = self.rows @ self.means.ravel()
         self._take()
@@ -201,7 +211,7 @@ class _Program:
         order = np.argsort(-every[:, 4], kind="stable")[: _AT_ONCE * units]
         return every[order, :4].astype(np.int64)
 
-    def _arrays(self) -> tuple[tuple[float, Floats], list[Any]]:
+    def _bound(self) -> tuple[float, Floats, list[Any]]:
         """Bounds, as of `Products.bound`, and the arrays that prove them."""
         dual = self.of.matrix + self.taken + (self.slack + self.slack.T) / 2
         if self.of.apart is not None:
@@ -213,9 +223,10 @@ class _Program:
         used, apart = self.weight > 0, np.array([self.apart])
         triples = self.cuts[used, 1:]
         weight = (self.weight[used] * np.where(self.cuts[used, 0] == 1, -1, 1)).astype(np.float32)
-        found = self.of.bound(dual_of(linear, pairs.astype(float)), triples, weight.astype(float), self.apart)
+        dual = dual_of(linear, pairs.astype(float))
+        bound, with_each = self.of.bound(dual, triples, weight.astype(float), self.apart)
         count = self.of.count.astype(np.uint8)
-        return found, [count, linear, pairs, triples.astype(np.uint16), weight, apart]
+        return bound, with_each, [count, linear, pairs, triples.astype(np.uint16), weight, apart]
 
 
 def _apart(one: Floats, weight: Floats, apart: Floats) -> tuple[Floats, float]:

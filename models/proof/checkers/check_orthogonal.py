@@ -840,14 +840,14 @@ class Particles:
 class Products(Particles):
     """A bound of energies from products of two particles (Lemma 12).
 
-    It is one of fields with other charges than a given one, of energy `least`.
+    It is one of fields with other charges than a known one, whose energy is at least `least`.
 
     matrix (u + 1, u + 1): [1 x] matrix [1 x] is at most the energy of the particles x, but for `error`.
-    apart (u + 1, u + 1): the same is positive at the given field alone; None if a particle of it is left out.
+    apart (u + 1, u + 1): the same is positive at the known field alone; None if a particle of it is left out.
     """
 
-    def __init__(self, charges: Charges, clouds: Clouds, count: Array, given: Array) -> None:
-        """As `Particles`. given (c,): how many particles of each kind the given field has."""
+    def __init__(self, charges: Charges, clouds: Clouds, count: Array, known: Array) -> None:
+        """As `Particles`. known (c,): how many particles of each kind the known field has."""
         super().__init__(charges, clouds, count)
         green, origin = (self.inverse + self.inverse.T) / 2, charges.origin
         energy = 2 * green - green @ self.laplacian @ green
@@ -859,7 +859,7 @@ class Products(Particles):
         cross = -(self.sign * pull[self.loop])[None]
         self.matrix = np.block([[np.array([[origin @ pull]]), cross], [cross.T, (between + between.T) / 2]])
         self.sum = np.append(-float(self.wanted), self.sign) if charges.closed.all() else None
-        has, self.apart = self.number < given[self.unit], None
+        has, self.apart = self.number < known[self.unit], None
         here = np.bincount(self.loop, self.sign * has, charges.size) - origin
         potential = green @ here
         size = 2 * np.abs(here) + np.abs(self.laplacian) @ np.abs(potential)
@@ -867,7 +867,7 @@ class Products(Particles):
         least = 2 * potential @ here - potential @ self.laplacian @ potential - error
         self.least = HALF**2 * float(least) + charges.rows.constant
         differ = 1 if self.sum is None else 2 * (self.sum @ np.append(1.0, has) == 0)  # particles, at least
-        if differ and (given <= count).all():
+        if differ and (known <= count).all():
             self.apart = np.diag(np.append(differ - has.sum(), 2.0 * has - 1))
 
     def bound(self, dual: Array, triples: Array, weight: Array, apart: float) -> tuple[float, Array]:
@@ -923,23 +923,26 @@ class Products(Particles):
         return constant, 2 * slope[:, 1:], 2 * far.sum(axis=1) + (far * np.abs(at)).sum(axis=1)
 
     def triangles(self, triples: Array, weight: Array) -> tuple[Array, float]:
-        """The matrix of inequalities times multipliers, and the size of the numbers in its sums.
+        """The matrix of triangle inequalities times multipliers, and the size of the numbers in its sums.
 
-        Of particles a, b, c: ab + ac <= a + bc with a weight that is positive, a + b + c <= 1 + ab + ac + bc
-        with -weight if it is negative.
+        weight (k,): multipliers, negated for inequalities of the second kind.
         """
-        n, (a, b, c), far = len(self.matrix), 1 + triples.T, weight < 0
-        size, turn = np.abs(weight), np.where(far, -1.0, 1.0)
-        entries = [
-            (a * n + b, size * turn),
-            (a * n + c, size * turn),
-            (b * n + c, -size),
-            (a * n + a, -size * turn),
-        ]
-        entries += [(b * n + b, size * far), (c * n + c, size * far), (0 * a, -size * far)]
-        place, number = (np.concatenate(part) for part in zip(*entries))
-        matrix = np.bincount(place, number, n * n).reshape(n, n)
+        size, n = np.abs(weight), len(self.matrix)
+        places, factors = triangle_terms(n, triples, weight < 0)
+        matrix = np.bincount(places.ravel(), (factors * size).ravel(), n * n).reshape(n, n)
         return (matrix + matrix.T) / 2, 7 * float(size.sum())
+
+
+def triangle_terms(size: int, triples: Array, is_second: Array) -> tuple[Array, Array]:
+    """The terms of triangle inequalities: places in a flat matrix (size, size), and factors, (7, k) each.
+
+    Of particles a, b, c, the first kind is ab + ac <= a + bc, the second a + b + c <= 1 + ab + ac + bc.
+    triples (k, 3): the particles. is_second (k,): the kinds. A particle has its place on the diagonal, after
+    that of 1.
+    """
+    (a, b, c), turn, far = 1 + triples.T, np.where(is_second, -1.0, 1.0), 1.0 * is_second
+    places = [a * size + b, a * size + c, b * size + c, a * (size + 1), b * (size + 1), c * (size + 1), 0 * a]
+    return np.array(places), np.array([turn, turn, -1 + 0 * turn, -turn, far, far, -far])
 
 
 class Branches(Particles):
@@ -1043,13 +1046,13 @@ def charges_bound(arrays: dict[str, Array], rows: CentredRows, threshold: float)
         return stored
 
     rounds, bounds, rest = products_count(arrays), [best], math.inf
-    given = base.take_array(arrays, "products_given", "|u1", len(count)).astype(int) if rounds else count
+    known = base.take_array(arrays, "products_known", "|u1", len(count)).astype(int) if rounds else count
     for number in range(rounds):
-        products = Products(charges, clouds, particles(f"products_{number}_particles"), given)
+        products = Products(charges, clouds, particles(f"products_{number}_particles"), known)
         rest = min(rest, products.least if products.apart is not None else math.inf)
         bound, count = products_bound(arrays, number, products, threshold)
         bounds.append(bound)
-    if "branches" in arrays:  # after products, they need not have the given charges
+    if "branches" in arrays:  # after products, they need not have the known charges
         bounds.append(branches_bound(arrays, Branches(charges, clouds, particles("branch_particles"))))
     return max(best, min(rest, max(bounds)))
 
@@ -1195,7 +1198,7 @@ def check_names(arrays: dict[str, Array], levels: int) -> None:
         stages = range(stage_count(arrays))
         more |= {*LOOPS} | {f"stage_{number}_{part}" for number in stages for part in STAGE_PARTS}
         more |= {f"products_{number}_{part}" for number in range(products_count(arrays)) for part in PRODUCTS}
-        more |= {"products", "products_given"} if "products" in arrays else set()
+        more |= {"products", "products_known"} if "products" in arrays else set()
         more |= {*BRANCHES} if "branches" in arrays else set()
     base.compare_names(arrays, {*PARTS, *of_domain, *more}, LEVEL_PARTS, levels)
 

@@ -59,13 +59,11 @@ _ENOUGH: Final = 0.1  # the same for a tiny gap
 _TINY: Final = 1e-3  # relative gap below which finer labels follow
 _MOST_OF: Final = 0.9  # of what rings cost: those with the rest come into use later, unless the gap is loose
 _MANY: Final = 0.1  # share of new rings above which they may come into use at the same spacing
-_LOOSE: Final = 0.2  # relative gap above which they do at the coarsest one, and no chain follows a search
+_LOOSE: Final = 0.2  # relative gap above which they do, no chain follows a search, and products end in time
 _STARTS: Final = 0.3  # of the time, after which no start is rounded with care
 _CHARGES: Final = 0.5  # of the time, which charges leave
 _MANY_FREE: Final = 400  # points without strokes above which levels exclude little, and charges are tried
-_CLOSED: Final = (
-    0.05  # relative gap of charges below which branches take the time of levels; products: _LOOSE
-)
+_CLOSED: Final = 0.05  # relative gap of charges below which branches take the time of levels
 _WORTH: Final = 0.5  # of the energy: what clouds prove where products pay, unless all loops are closed
 _LOOK: Final = 1e-4  # seconds per point of a first look at charges, and of its check, where points are many
 _PULL: Final = 1e-9  # relative: makes the matrix of prescribed rings of a closed part definite
@@ -292,17 +290,13 @@ class _Prover:
         )  # fmt: skip
         stages |= products
         bound = checker.charges_bound(stages, rows, threshold)
-        if bound > self.charges:
-            branches, other = branch_arrays(
-                charges,
-                clouds,
-                count,
-                threshold,
-                lambda seconds: self._is_over(bound, ahead + seconds, _CLOSED),
-            )
-            self._offer_charges(arrays, other)
-            stages |= branches
         self._offer_charges(arrays, better)
+        if bound > self.charges:
+            branches, better = branch_arrays(
+                charges, clouds, count, threshold, lambda more: self._is_over(bound, ahead + more, _CLOSED)
+            )
+            self._offer_charges(arrays, better)
+            stages |= branches
         return stages
 
     def _offer_charges(self, arrays: Arrays, charges: Floats | None) -> None:

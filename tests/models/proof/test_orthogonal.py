@@ -184,7 +184,7 @@ def test_no_products_have_a_bound_above_the_energies_of_other_charges(mesh, nois
     arrays, _, _ = products.products_arrays(*parts, sums[first], **options)
     linear, pairs, triples, weight, (more,) = (arrays[f"products_0_{part}"] for part in checker.PRODUCTS[1:])
     linear, pairs = linear + noise * rng.normal(size=linear.shape), pairs + noise * rng.random(len(pairs))
-    of = checker.Products(*parts, arrays["products_given"].astype(int))
+    of = checker.Products(*parts, arrays["products_known"].astype(int))
     assert of.least == pytest.approx(energies[first])
     bound, with_each = of.bound(
         checker.dual_of(linear, pairs), triples.astype(int), weight * (1 + noise), more + noise

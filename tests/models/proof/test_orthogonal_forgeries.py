@@ -300,7 +300,7 @@ BROKEN_PRODUCTS = [
     ("triples are not of three", with_entry("products_0_triples", 0, 999)),
     ("particles leaves out", lambda a: a | {"products_1_particles": 0 * a["products_1_particles"]}),
     ("leaves out a particle", with_entry("products_0_linear", 1, 99.0)),
-    ("is proven", lambda a: a | {"products_given": 0 * a["products_given"]}),
+    ("is proven", lambda a: a | {"products_known": 0 * a["products_known"]}),
     ("products", lambda a: a | {"products": np.array([3], np.int32)}),
 ]
 

@@ -16,7 +16,7 @@ import pytest
 from command_line import invoke
 from crossfield.models.processes.deadline import Deadline
 from crossfield.models.proof.checkers import check_certificate
-from crossfield.models.proof.descent import orthogonal
+from crossfield.models.proof.descent import descent, orthogonal
 from exhaustive import exact, random_instance, sketch
 from instance_kinds import kind
 from small_drawings import read, svg
@@ -260,3 +260,11 @@ def test_ctrl_c_ends_a_proof_with_the_levels_that_are_checked(name, size, words,
         assert (read.bound, read.gap, read.forced) == (proof.bound, proof.gap, proof.forced)
     else:
         assert proof.bound == 0.0
+
+
+@pytest.mark.slow
+def test_a_proof_ends_where_no_finer_level_fits_in_memory(monkeypatch, tmp_path):
+    monkeypatch.setattr(descent, "MOST_LABELS", 30_000)
+    proof = cf.prove(cf.sample("ring", 12), jobs=1)
+    assert (proof.ended, [round(np.pi / 2 / level.h) for level in proof.levels]) == ("labels", [16, 32])
+    assert cf.write_certificate(proof, tmp_path / "it.npz").bound == proof.bound <= proof.energy
