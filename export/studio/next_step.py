@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 from ...models.sketch.cover import CUT, cover_by_segments
+from ...models.sketch.meetings import find_meetings
 from ...models.sketch.outline import find_inside
 from .document import Document
-from .meetings import find_meetings, frame_of, lines_of
+from .meetings import frame_of, lines_of
 
 NextStep = Literal["outline", "line", "across", ""]
 

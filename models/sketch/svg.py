@@ -35,8 +35,9 @@ from ..instance.domain import Bools, Floats, Ints
 from .cascade import UNSHOWN, Cascade, background_of, cascade_of
 from .colour import PAPER, is_red
 from .cover import Box
-from .curves import Curves, lines_as_cubics, run_numbers
+from .curves import Curves, flatten, lines_as_cubics, run_numbers
 from .labels import LabelMatcher, colour_label, labels_of
+from .meetings import GRID, find_meetings, resample
 from .path_data import SHAPES, path_data, shape_curves, too_many_curves
 from .svg_effort import choose_side
 from .svg_elements import (
@@ -85,7 +86,9 @@ _PAINTED: Final = 0.1  # least length of traced strokes, as a share of the lengt
 _FAR: Final = 1000.0  # sides of the page: coordinates beyond it are too large for a renderer
 _FINEST: Final = 1e-5  # of the page: least width of a stroke that is seen
 _FAINT: Final = 0.24  # of the strength of others: less than half as dark, or a quarter as wide
+_WEAK: Final = 0.48  # the same for lines that are surely no part of the object
 _STRONG: Final = 0.1  # of the length of lines: part that is stronger than what others are compared with
+_MOST: Final = 0.5  # the same for curvature lines, which may be finer than few bold ones
 _ASIDE: Final = 0.06  # of its chord: distance of a straight line from it, also of one drawn by hand
 _CORNER: Final = 0.02  # of the sides of the box of other lines: distance from a corner of it
 _MOST_STOPS: Final = 100  # stops of a gradient that count
@@ -293,7 +296,7 @@ def _trace_strokes(
     strength = np.array([np.median(difference[tuple(way.T)]) ** 2 for way, _ in ways])
     red, points = np.array([is_line for _, is_line in ways], dtype=bool)[number], np.concatenate(cubics)
     chosen = red if has_choice else None
-    faint = _find_faint(points, number, strength[number], red) & ~(has_choice & red)
+    faint = _find_faint(points, [number], strength[number], red) & ~(has_choice & red)
     return Curves(points, number, red, page.box if page else None, chosen, notes, faint)
 
 
@@ -381,34 +384,46 @@ def _join_strokes(
     strength = np.array([part.strength for part in seen])[number]
     is_line = red if chosen is None else chosen
     # An element has several lines, or dashes of one.
-    faint = _find_faint(points, run, strength, is_line) | _find_faint(points, number, strength, is_line)
+    line = np.concatenate([part.line for part in seen])
+    faint = _find_faint(points, [line, number], strength, is_line)
     if chosen is not None:
         faint &= ~chosen
     return Curves(points, run, red, page.box if page else None, chosen, notes, faint)
 
 
-def _find_faint(points: Floats, number: Ints, strength: Floats, is_line: Bools) -> Bools:
-    """Which cubics (k,) are of lines much paler or thinner than others of their kind; if straight, than all.
+def _find_faint(points: Floats, lines: Sequence[Ints], strength: Floats, is_line: Bools) -> Bools:
+    """Which cubics (k,) are of lines much paler or thinner than others.
 
-    Where all strokes are curvature lines, pale ones may be sections of the object. Only straight ones that
-    begin and end outside of the others, or in corners of their box, are surely construction lines.
+    Weak ones, which may be a third as wide, have to be surely no part of the object: curvature lines go on
+    across them, or, where all are curvature lines, they are straight, and begin and end outside of the others
+    or in corners of their box.
 
-    number: of the line of each cubic, ascending.
+    lines: number of the line of each cubic, ascending; several if what is a line is open.
     """
-    first = np.flatnonzero(np.diff(number, prepend=-1))
-    after = np.append(first[1:], len(number))
-    strength, is_line = strength[first], is_line[first]
-    ends = np.stack([points[first, 0], points[after - 1, 3]], axis=1)
-    legs = vector_length(*np.moveaxis(np.diff(points, axis=1), -1, 0)).sum(axis=1)
-    length = np.add.reduceat(legs, first)
+    is_line = is_line | (not is_line.any())
+    length = vector_length(*np.moveaxis(np.diff(points, axis=1), -1, 0)).sum(axis=1)
 
-    def is_weak(kind: Bools) -> Bools:
+    def is_below(kind: Bools, ratio: float, part: float) -> Bools:
         order = np.argsort(-np.where(kind, strength, np.nan), kind="stable")  # not numbers are last
         ahead = np.cumsum(np.where(kind & np.isfinite(strength), length, 0.0)[order])
-        strong = strength[order[np.searchsorted(ahead, _STRONG * ahead[-1])]]
-        return np.asarray(kind & (strength <= _FAINT * strong))
+        return np.asarray(strength <= ratio * strength[order[np.searchsorted(ahead, part * ahead[-1])]])
 
-    weak = is_weak(np.ones(len(first), dtype=bool))
+    weak = is_below(is_line, _WEAK, _MOST)
+    if not is_line.all():
+        cuts = ~is_line & weak
+        faint = (is_line & is_below(is_line, _FAINT, _STRONG)) | (cuts & is_below(~is_line, _FAINT, _STRONG))
+        return faint | _are_crossed(points, lines[0], cuts, is_line)
+    weak |= is_below(is_line, _FAINT, _STRONG)
+    corners = points[~weak].reshape(-1, 2)
+    box = corners.min(axis=0), corners.max(axis=0)
+    return np.asarray(weak & np.any([_leave_box(points, number, *box) for number in lines], axis=0))
+
+
+def _leave_box(points: Floats, number: Ints, low: Floats, high: Floats) -> Bools:
+    """Which cubics (k,) are of straight lines that begin and end outside of a box, or in its corners."""
+    first = np.flatnonzero(np.diff(number, prepend=-1))
+    after = np.append(first[1:], len(number))
+    ends = np.stack([points[first, 0], points[after - 1, 3]], axis=1)
     way = ends[:, 1] - ends[:, 0]
     ahead, beside = (
         np.repeat(way, after - first, axis=0),
@@ -417,14 +432,27 @@ def _find_faint(points: Floats, number: Ints, strength: Floats, is_line: Bools) 
     across = np.abs(ahead[:, :1] * beside[..., 1] - ahead[:, 1:] * beside[..., 0]).max(axis=1)
     is_straight = np.maximum.reduceat(across, first) <= _ASIDE * (way**2).sum(axis=1)
     is_straight &= way.any(axis=1)
-    if is_line.any() and not is_line.all():
-        return np.repeat((weak & is_straight) | is_weak(is_line) | is_weak(~is_line), after - first)
-    corners = points[~np.repeat(weak, after - first)].reshape(-1, 2)
-    low, high = corners.min(axis=0), corners.max(axis=0)
     room = _CORNER * (high - low)
     is_corner = ((ends < low + room) | (ends > high - room)).all(axis=2)
     is_outside = ((ends < low) | (ends > high)).any(axis=2) | is_corner
-    return np.repeat(weak & is_straight & is_outside.all(axis=1), after - first)
+    return np.repeat(is_straight & is_outside.all(axis=1), after - first)
+
+
+def _are_crossed(points: Floats, number: Ints, weak: Bools, is_line: Bools) -> Bools:
+    """Which cubics (k,) are of weak lines across which curvature lines go on."""
+    if not weak.any():
+        return weak
+    pixel = float(np.ptp(points.reshape(-1, 2), axis=0).max()) / GRID
+    kept = weak | is_line
+    segments, owner = flatten(points[kept], pixel / 10)
+    first = np.flatnonzero(np.diff(number[kept][owner], prepend=-1))
+    parts = np.split(segments / pixel, first[1:])
+    pairs = find_meetings(
+        [resample(np.concatenate([part[:, 0], part[-1:, 1]])) for part in parts], most_ends=0
+    )[0]
+    own = number[kept][owner[first]]
+    is_weak = weak[kept][owner[first]]
+    return np.isin(number, own[pairs[is_weak[pairs] & ~is_weak[pairs][:, ::-1]]]) & weak
 
 
 def _list_unread(

@@ -66,11 +66,13 @@ class PaintedShape:
 class Seen:
     """The visible part of a shape.
 
-    points: (m, 4, 2), control points. colour: red, green, blue in [0, 1]. strength: of its line, the square
-    of its difference from the ground, in [0, 1], times its width; not a number for an area.
+    points: (m, 4, 2), control points. line: (m,), number of the unbroken line, among all shapes, of which
+    each is a part. colour: red, green, blue in [0, 1]. strength: of its lines, the square of their difference
+    from the ground, in [0, 1], times their width; not a number for an area.
     """
 
     points: Floats
+    line: Ints
     colour: tuple[float, float, float]
     strength: float
 
@@ -106,12 +108,11 @@ def see_strokes(
     samples = _sample_lines(shapes, window, pixel)
     styles = [shape.element.get("style", "") for shape in shapes]
     for shape, style in zip(shapes, styles, strict=True):
-        shape.element.set("style", style + _widened(shape, pixel))
+        _restyle(shape, style + _widened(shape, pixel))
     shown, ground = picture_of(root, paper), None
     if any(shape.is_ground for shape in shapes):
         for shape, style in zip(shapes, styles, strict=True):
-            bare = style + ";stroke:none" + ("" if shape.is_ground else ";fill:none")
-            shape.element.set("style", bare.lstrip(";"))  # resvg drops a style that begins with a semicolon
+            _restyle(shape, style + ";stroke:none" + ("" if shape.is_ground else ";fill:none"))
         ground = picture_of(root, paper)
     expected = np.array([opaque_colour(shape.paint) for shape in shapes])[samples.shape]
 
@@ -145,6 +146,11 @@ def _shows_colour(samples: _LineSamples, visible: Bools, front: Indices, own: Bo
     in_front = visible & (own | (front == 2 * samples.shape))
     has_some = np.bincount(samples.shape, in_front) > 0
     return np.asarray(in_front | (visible & ~has_some[samples.shape] & ((front < 0) | (front % 2 == 1))))
+
+
+def _restyle(shape: PaintedShape, style: str) -> None:
+    """Give a shape another style. resvg drops one that begins with a semicolon."""
+    shape.element.set("style", style.lstrip(";"))
 
 
 def _widened(shape: PaintedShape, pixel: float) -> str:
@@ -256,7 +262,7 @@ def _find_fronts(
         flat = ";opacity:1;stroke-opacity:1;fill-opacity:1"
         flat += f";stroke:{line}" if len(shape.points) else ""
         flat += f";fill:{area}" if shape.is_filled else ""
-        shape.element.set("style", style + _widened(shape, pixel) + flat)
+        _restyle(shape, style + _widened(shape, pixel) + flat)
     _make_opaque(root)
     picture = picture_of(root).reshape(-1, 3)
     known = {_flat_colour(number): number for number in range(2 * len(shapes))} | {0xFFFFFF: -1}
@@ -354,5 +360,6 @@ def _collect(
             strength = difference**2 * shape.width if shape.is_stroked else np.nan
             rgb = rgb if (np.abs(median - rgb) <= _SAME).all() else np.array(median)
         red, green, blue = np.nan_to_num(rgb).tolist()
-        seen.append(Seen(parts[bounds[number] : bounds[number + 1]], (red, green, blue), strength))
+        kept = slice(bounds[number], bounds[number + 1])
+        seen.append(Seen(parts[kept], samples.run[starts][kept], (red, green, blue), strength))
     return seen

@@ -55,11 +55,11 @@ def test_hatching_and_ruled_paper_are_left_out_and_reported(parallels, flow):
 @for_each(
     "lines",
     [
-        BODY + HATCHING.replace("gray", "red"),
+        BODY.replace("/>", ' stroke-width="9"/>') + HATCHING.replace("gray", "red"),
         BODY + rows((90, 180, 110, 200), (3, -3), 7, "gray"),
         BODY
         + "".join(
-            rows((150, 150, *end), (0, 0), 1, "gray")  # a fan
+            rows((150, 150, *end), (0, 0), 1, "black")  # a fan
             for end in 300 * np.random.default_rng(0).random((40, 2))
         ),
         BODY + rows((110, 80, 140, 80), (0, 14), 9, "black"),  # a grille
@@ -69,8 +69,8 @@ def test_hatching_and_ruled_paper_are_left_out_and_reported(parallels, flow):
         BODY + rows((80, 150, 80, 155), (9, 0), 15, "gray"),  # ticks in a row
     ],
 )
-def test_other_lines_are_no_hatching(lines):
-    assert not any("hatching" in warning for warning in drawing(lines, FLOW).reading.warnings)
+def test_other_lines_are_neither_hatching_nor_construction_lines(lines):
+    assert not any("left out as" in warning for warning in drawing(lines, FLOW).reading.warnings)
 
 
 @for_each(
