@@ -463,7 +463,7 @@ Concave = Annotated[
         "--concave",
         metavar="X,Y",
         help="A place in the drawing, in its coordinates, whose part of the surface is a bowl, not a bump."
-        " May be repeated.",
+        " May be repeated. Hints, if any, take precedence.",
     ),
 ]
 Hints = Annotated[
