@@ -54,6 +54,20 @@ def factor_matrix(matrix: Any, *, pull: float = PULL) -> Solve:
     return solve
 
 
+def solve_banded(matrix: Any, right: Floats, raised: Floats) -> Floats:
+    """The x with (H + diag(raised) + PULL) x = right, for a definite H with all entries near its diagonal."""
+    from scipy.linalg import solveh_banded
+
+    below = np.repeat(np.arange(len(right)), np.diff(matrix.indptr)) - matrix.indices
+    lower, width = below >= 0, below.max() + 1
+    band = np.zeros((len(right), width))
+    band.ravel()[(matrix.indices * width + below)[lower]] = matrix.data[lower]
+    band[:, 0] += raised + PULL
+    with one_thread():
+        solution: Floats = solveh_banded(band.T, right, lower=True, overwrite_ab=True, check_finite=False)
+    return solution
+
+
 def solve_by_gradients(
     matrix: Any,
     right: np.ndarray[Any, Any],

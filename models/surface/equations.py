@@ -13,7 +13,7 @@ from scipy import sparse
 
 from ..instance.domain import Bools, Floats, Ints
 from ..instance.least_squares import Residuals
-from ..instance.sparse_systems import SimilarSystems
+from ..instance.sparse_systems import SimilarSystems, solve_banded
 from ..processes.deadline import IsOver
 from .stencils import SLOPES, Crosses, Stencils, scale_rows
 
@@ -27,10 +27,11 @@ _FEW: Final = 100  # unknowns
 _DAMPING: Final = 1e-2
 _LEAST: Final = 1e-9
 _RESIDUAL: Final = 0.05  # relative, of a large system that is not factored
-_EXACT: Final = 1e-9  # of a small one, because starts are compared there
-_SMALL: Final = 1000  # unknowns of a small system
+_SMALL: Final = 1000  # unknowns of a system that is solved exactly, because starts are compared there
+_NARROW: Final = 100  # columns of its mask, or the band of its matrix is too wide
 _STEPS: Final = 12  # of conjugate gradients, which take as long as a factorisation
 _MEETING: Final = 2  # rows or columns between two heights that meet in a square
+_PAIRS: Final = np.kron(SLOPES, SLOPES).T  # of two slopes, for each pair of corners
 _UP: Final = 5.0
 _DOWN: Final = 8.0
 
@@ -64,14 +65,10 @@ class Equations:
     extra: Sequence[Residuals] = ()
 
     @cached_property
-    def _lines(self) -> tuple[Floats, Floats]:
-        return self.crosses.lines
-
-    @cached_property
-    def _along(self) -> tuple[Any, Any]:
-        """The matrices (n, N) of the slopes along u and v."""
-        first, second = (_along(self.stencils.slopes, line) for line in self._lines)
-        return first, second
+    def _lines(self) -> Floats:
+        """Unit vectors (2, 2, n) along u and v."""
+        u, v = self.crosses.lines
+        return np.stack([u.T, v.T])
 
     @cached_property
     def conjugacy(self) -> Any:
@@ -114,19 +111,20 @@ class Equations:
         constant = self._even.T @ self._even
         return BlockSum.of(constant, corners[:, first], corners[:, second], self.stencils.used)
 
-    def right_angles(self, z: Floats) -> Floats:
-        """The cosines r (n,) of the angles in space between both lines."""
+    def right_angles(self, slopes: Floats) -> Floats:
+        """The cosines r (n,) of the angles in space between both lines, by slopes (2, n)."""
         u, v = self._lines
-        a, b = (along @ z for along in self._along)
-        return np.asarray((np.sum(u * v, axis=1) + a * b) / np.sqrt((1 + a * a) * (1 + b * b)))
+        a, b = (np.sum(line * slopes, axis=0) for line in (u, v))
+        return np.asarray((np.sum(u * v, axis=0) + a * b) / np.sqrt((1 + a * a) * (1 + b * b)))
 
     def energy(self, z: Floats) -> float:
         """The energy of heights."""
-        cosine, scale = self.right_angles(z), self.weights.forgiven
+        slopes, scale = self.stencils.gradient(z), self.weights.forgiven
+        cosine = self.right_angles(slopes)
         plain = np.isinf(scale)
         loss = np.sum(cosine**2) if plain else scale**2 * np.sum(np.log1p((cosine / scale) ** 2))
-        normals = normals_of(self.stencils, z)
-        uneven = sum(normal @ (self.stencils.unevenness @ normal) for normal in normals)
+        normals = normals_of(slopes)
+        uneven = np.sum(normals.T * (self.stencils.unevenness @ normals.T))
         return float(
             loss
             + self._linear.energy(z)
@@ -136,36 +134,36 @@ class Equations:
 
     def model(self, z: Floats) -> tuple[Floats, Any]:
         """Half the slope (N,) of the energy at z, and half its curvature (N, N) by Gauss and Newton."""
-        down, angles = self._of_angles(z)
-        even, blocks = self._of_normals(z)
-        facing = self.weights.facing * normals_of(self.stencils, z)[2] ** 2
-        blocks[:, :, : len(facing)] += angles
-        blocks[[0, 1], [0, 1], : len(facing)] += facing
-        slope = self._linear.slope(z)
-        for matrix, part in zip(self.stencils.slopes, down + even, strict=True):
-            slope += matrix.T @ (part + facing * (matrix @ z))
+        slopes = self.stencils.gradient(z)
+        normals = normals_of(slopes)
+        down, angles = self._of_angles(slopes)
+        even, blocks = self._of_normals(slopes, normals)
+        facing = self.weights.facing * normals[2] ** 2
+        blocks[:, :, : len(facing)] += angles + facing * np.eye(2)[..., None]
+        parts = down + even + facing * slopes
         extra = (hint.normal_matrix for hint in self.extra)
-        return slope, sum(extra, self._sum.matrix(blocks))
+        linear = self._linear.normal_matrix @ z - self._linear.right_side
+        return linear + self.stencils.spread(parts), sum(extra, self._sum.matrix(blocks))
 
-    def _of_angles(self, z: Floats) -> tuple[Floats, Floats]:
+    def _of_angles(self, slopes: Floats) -> tuple[Floats, Floats]:
         """Slope (2, n) and curvature (2, 2, n) of the right angles by dz/dx and dz/dy of each pixel."""
         u, v = self._lines
-        cosine = self.right_angles(z)
-        a, b = (along @ z for along in self._along)
+        cosine = self.right_angles(slopes)
+        a, b = (np.sum(line * slopes, axis=0) for line in (u, v))
         long_a, long_b = 1 + a * a, 1 + b * b
         both = np.sqrt(long_a * long_b)
-        change = u.T * (b / both - cosine * a / long_a) + v.T * (a / both - cosine * b / long_b)
+        change = u * (b / both - cosine * a / long_a) + v * (a / both - cosine * b / long_b)
         weighed = change / (1 + (cosine / self.weights.forgiven) ** 2)
         return weighed * cosine, weighed[:, None] * change
 
-    def _of_normals(self, z: Floats) -> tuple[Floats, Floats]:
+    def _of_normals(self, slopes: Floats, normals: Floats) -> tuple[Floats, Floats]:
         """Slope (2, n) of uneven normals, and curvature (2, 2, k) at the k places of `_sum`."""
         grid, uneven = self.stencils.grid, self.stencils.unevenness
-        normals, change = normals_of(self.stencils, z), changes_of_normals(self.stencils, z)
-        weight = self.weights.even * grid.size
-        diagonal = np.einsum("cak,cbk->abk", weight * uneven.diagonal() * change, change)
-        beside = np.einsum("cak,cbk->abk", -weight * change[:, :, grid.first], change[:, :, grid.second])
-        slope = np.einsum("cak,ck->ak", change, weight * (uneven @ normals.T).T)
+        weight, change = self.weights.even * grid.size, changes_of_normals(slopes)
+        first, second = change.take(grid.first, axis=2), change.take(grid.second, axis=2)
+        diagonal = weight * uneven.diagonal() * np.sum(change[:, :, None] * change[:, None], axis=0)
+        beside = -weight * np.sum(first[:, :, None] * second[:, None], axis=0)
+        slope = weight * np.sum(change * (uneven @ normals.T).T[:, None], axis=0)
         return slope, np.concatenate([diagonal, beside, beside.swapaxes(0, 1)], axis=2)
 
 
@@ -208,20 +206,20 @@ class BlockSum:
 
     def matrix(self, blocks: Floats) -> Any:
         """The matrix for blocks (2, 2, k)."""
-        entries = np.kron(SLOPES, SLOPES).T @ blocks.reshape(4, -1)
+        entries = _PAIRS @ blocks.reshape(4, -1)
         data = self.constant.data + np.bincount(self.places, entries.ravel(), len(self.constant.data))
         return sparse.csr_array((data, self.constant.indices, self.constant.indptr), self.constant.shape)
 
 
-def normals_of(stencils: Stencils, z: Floats) -> Floats:
-    """The unit normals of the pixels, with their parts x, y and z one below the other: shape (3, n)."""
-    x, y = (slope @ z for slope in stencils.slopes)
+def normals_of(slopes: Floats) -> Floats:
+    """The unit normals (3, n) of the pixels, parts x, y and z one below the other, by slopes (2, n)."""
+    x, y = slopes
     return np.asarray(np.stack([-x, -y, np.ones_like(x)]) / np.sqrt(1 + x * x + y * y))
 
 
-def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
+def changes_of_normals(slopes: Floats) -> Floats:
     """Derivatives of the parts of the normals by dz/dx and dz/dy at the same pixel: shape (3, 2, n)."""
-    x, y = (slope @ z for slope in stencils.slopes)
+    x, y = slopes
     changes: Floats = np.array([[-1 - y * y, x * y], [x * y, -1 - x * x], [-x, -y]])
     changes *= (1 + x * x + y * y) ** -1.5
     return changes
@@ -230,16 +228,20 @@ def changes_of_normals(stencils: Stencils, z: Floats) -> Floats:
 def descend(equations: Equations, z: Floats, is_over: IsOver) -> tuple[float, Floats]:
     """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
     energy, damping = equations.energy(z), _DAMPING
-    solver, residual = SimilarSystems(steps=_STEPS), _EXACT if len(z) <= _SMALL else _RESIDUAL
+    solver = SimilarSystems(steps=_STEPS)
+    is_small = len(z) <= _SMALL and equations.stencils.grid.width <= _NARROW
     least_fall = _FALL_OF_FEW if len(z) <= _FEW else _FALL
     for _ in range(_ROUNDS):
         if is_over():
             break
         slope, curvature = equations.model(z)
-        diagonal = sparse.diags_array(curvature.diagonal())
+        diagonal = curvature.diagonal()
         for _ in range(_TRIALS):
-            damped = curvature + damping * diagonal
-            tried = z - solver.solve(damped, slope, residual)
+            if is_small:
+                step = solve_banded(curvature, slope, damping * diagonal)
+            else:
+                step = solver.solve(curvature + sparse.diags_array(damping * diagonal), slope, _RESIDUAL)
+            tried = z - step
             reached = equations.energy(tried)
             if reached < energy:
                 break

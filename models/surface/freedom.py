@@ -90,7 +90,7 @@ def find_open_depth(level: GridLevel, z: Floats) -> Hint | None:
     turns = turns.min(axis=0)[np.isfinite(turns).all(axis=0)]
     if len(turns) < _KNOWN * level.grid.size or np.quantile(turns, _MOST) > _STRAIGHT:
         return None
-    grid, (x, y, toward) = level.grid, normals_of(level.stencils, z)
+    grid, (x, y, toward) = level.grid, normals_of(level.stencils.gradient(z))
     depth = _depth(grid.mask)[grid.mask]
     at = int(np.argmin(np.where(depth >= depth.max() / 2, toward, 1.0)))
     slant, tilt = np.arccos(toward[at]), np.arctan2(y[at], x[at])

@@ -146,7 +146,7 @@ def _descend_with_hints(
 
 def _orient(level: GridLevel, z: Floats, *, flip: bool) -> Floats:
     """The heights or their negatives, whichever lean outward at the border, else upwards; or the opposite."""
-    lean = normals_of(level.stencils, z)[:2].T
+    lean = normals_of(level.stencils.gradient(z))[:2].T
     inside = np.pad(level.grid.mask, 1)
     row, column = level.grid.rows + 1, level.grid.columns + 1
     sides = [(0, 1, 1, 0), (0, -1, -1, 0), (-1, 0, 0, 1), (1, 0, 0, -1)]

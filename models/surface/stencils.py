@@ -81,6 +81,14 @@ class Stencils:
         number[self.used] = np.arange(self.count, dtype=np.int32)
         return np.stack([corner[self.grid.mask] for corner in corners_of_blocks(number)])
 
+    def gradient(self, z: Floats) -> Floats:
+        """The slopes (2, n) by x and y of heights (N,)."""
+        return SLOPES @ z[self.corners]
+
+    def spread(self, parts: Floats) -> Floats:
+        """The sums (N,) of numbers (2, n) by the slopes in which each height takes part."""
+        return np.bincount(self.corners.ravel(), (SLOPES.T @ parts).ravel(), self.count)
+
     def _at_points(self, *weights: float) -> Any:
         return _weighted_sums(self.corners, self.count, *weights)
 

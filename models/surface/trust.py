@@ -21,7 +21,8 @@ _PLAIN: Final = Weights(even=0.0, facing=0.0)
 def right_angle_deviation(field: CrossField, heights: Floats) -> Floats:
     """Deviation from a right angle between each cross's lines on the surface, in [0, pi/2] radians; (n,)."""
     stencils = Stencils(field.instance.grid)
-    cosine = Equations(stencils, Crosses.of(field), _PLAIN).right_angles(heights[stencils.used])
+    slopes = stencils.gradient(heights[stencils.used])
+    cosine = Equations(stencils, Crosses.of(field), _PLAIN).right_angles(slopes)
     return np.arcsin(np.minimum(np.abs(cosine), 1.0))
 
 
