@@ -54,13 +54,10 @@ def field_sheet(field: CrossField, drawing: Underlay | None = None) -> Sheet:
     )
 
 
-def strokes_sheet(
-    instance: Instance, page: Box, drawing: Underlay | None = None, width: float | None = None
-) -> Sheet:
+def strokes_sheet(instance: Instance, page: Box, drawing: Underlay | None = None) -> Sheet:
     """The strokes of the drawing, or of the instance, on a page that is moved to the origin.
 
-    Renderers compute in single precision, too coarse for a page far away. width: of lines in pixels of the
-    grid.
+    Renderers compute in single precision, too coarse for a page far away.
     """
     x, y, wide, high = page
     frame, unit = _frame_and_unit(instance)
@@ -68,7 +65,7 @@ def strokes_sheet(
         moved = replace(frame, corner=(frame.corner[0] - x, frame.corner[1] - y))
         layer = Layer("strokes", _stroke_lines(moved, unit))
     else:
-        layer = _drawing_layer(drawing, unit, width and width * instance.pixel_size, (x, y))
+        layer = _drawing_layer(drawing, unit, (x, y))
     return Sheet((0.0, 0.0, wide, high), (layer,))
 
 
@@ -90,16 +87,14 @@ def _frame_and_unit(instance: Instance) -> tuple[GridFrame, float]:
     return frame, float(instance.pixel_size * max(instance.mask.shape) / UNITS)
 
 
-def _drawing_layer(
-    drawing: Underlay, unit: float, width: float | None = None, origin: tuple[float, float] = (0.0, 0.0)
-) -> Layer:
-    """The ink of a drawing, or its curves with a line width; by default many over each other are thinner."""
+def _drawing_layer(drawing: Underlay, unit: float, origin: tuple[float, float] = (0.0, 0.0)) -> Layer:
+    """The ink of a drawing, or its curves with a line width; many over each other are thinner."""
     if drawing.ink is not None:
         high, wide = (drawing.scale * side for side in drawing.ink.shape[:2])
         return Layer("drawing", (ImageMark((-origin[0], -origin[1], wide, high), drawing.ink),))
     every = [piece for curves in drawing.curves.values() for piece in curves]
     length = sum(float(np.linalg.norm(np.diff(line, axis=1), axis=-1).sum()) for line in every)
-    width = width or _BELOW * unit / np.sqrt(max(length / (_MUCH * UNITS * unit), 1.0))
+    width = _BELOW * unit / np.sqrt(max(length / (_MUCH * UNITS * unit), 1.0))
     lines = (
         Lines(INK[name], width, [curve - origin for curve in curves])
         for name, curves in drawing.curves.items()

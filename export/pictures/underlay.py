@@ -22,7 +22,7 @@ from ...models.instance.domain import Floats
 from ...models.instance.instance import Instance
 from ...models.sketch.bitmap import Bitmap
 from ...models.sketch.cover import Box, Frame
-from ...models.sketch.curves import Curves, are_straight, run_numbers
+from ...models.sketch.curves import Curves, are_straight, flatten, run_numbers
 from ...models.sketch.drawing_file import parse_drawing, read_file
 from ...models.sketch.read import DEFAULT_SIZE
 from ...models.sketch.samples import SAMPLES, sample_svg
@@ -53,6 +53,14 @@ class Underlay:
     declared: Box | None
     ink: NDArray[np.uint8] | None = None
     scale: float = 1.0
+
+    def segments(self, tolerance: float) -> Floats:
+        """Straight segments (m, 2, 2) within a tolerance of the curves."""
+        runs = [run for runs in self.curves.values() for run in runs]
+        return np.concatenate(
+            [run if run.shape[1] == 2 else flatten(run, tolerance)[0] for run in runs]
+            or [np.empty((0, 2, 2))]
+        )
 
 
 def read_underlay(source: str | Path, *, on: Instance) -> Underlay:
@@ -90,9 +98,11 @@ def underlay_of_curves(curves: Curves, data: bytes = b"") -> Underlay:
     (left, top), (width, height) = low.tolist(), (high - low).tolist()
     page = (left, top, width, height)
     starts = np.flatnonzero(np.diff(run_numbers(curves.points, curves.curve), prepend=-1))
+    straight = np.logical_and.reduceat(are_straight(curves.points), starts)
     runs_by_colour: dict[str, list[Floats]] = {name: [] for name in INK}
-    for run, red in zip(np.split(curves.points, starts[1:]), curves.red[starts], strict=True):
-        runs_by_colour["red" if red else "black"].append(run[:, [0, 3]] if are_straight(run) else run)
+    runs = np.split(curves.points, starts[1:])
+    for run, red, is_straight in zip(runs, curves.red[starts], straight, strict=True):
+        runs_by_colour["red" if red else "black"].append(run[:, ::3] if is_straight else run)
     return Underlay(page, runs_by_colour, _page_size(data, curves.page, page), curves.page)
 
 

@@ -20,7 +20,7 @@ from ...models.field.field import CrossField
 from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.instance import SKEW_WEIGHT, Instance
 from ...models.processes.child_program import is_stopped
-from ...models.sketch.cover import Frame, curve_pixels, fit_frame
+from ...models.sketch.cover import Frame, fit_frame, pixels_along
 from ...models.sketch.curves import Curves
 from ...models.sketch.drawing_file import Drawing, parse_drawing
 from ...models.sketch.parallels import leave_out_non_edges
@@ -81,8 +81,9 @@ def read_drawn(document: Document, size: int | None = None) -> DrawnInstance:
         name=document.name,
         source=source.name if source else f"{document.name}.svg",
     ).with_weights(stroke_weight=document.stroke_weight, skew_weight=SKEW_WEIGHT)
-    segments, curve, line = curves.segments(frame)
-    owner, row, column = curve_pixels(segments[line], curve[line], frame)
+    pixels = (curves.covers(frame) if source else covers).pixels
+    assert pixels is not None  # of curves
+    owner, row, column = pixels
     number = np.full(frame.shape, -1)
     number[tuple(instance.stroke_pixels.T)] = np.arange(len(instance.theta))
     pairs = np.stack([owner, number[row, column]], axis=1)
@@ -151,19 +152,11 @@ def _enclosed_parts(area: Bools) -> Bools:
 
 def _brushed_pixels(edit: MaskEdit, frame: Frame) -> Bools:
     """The pixels whose middles a brush passes over, at least the pixels under its path."""
-    points = (edit.points - (frame.x, frame.y)) / frame.pixel
-    steps = np.maximum(np.ceil(2 * np.hypot(*np.diff(points, axis=0).T)).astype(int), 1)
-    parts = [
-        np.linspace(begin, end, min(step, 4 * frame.width), endpoint=False)
-        for begin, end, step in zip(points[:-1], points[1:], steps, strict=True)
-    ]
-    column, row = np.floor(np.concatenate([*parts, points[-1:]])).astype(int).T
-    on = (row >= 0) & (column >= 0) & (row < frame.height) & (column < frame.width)
-    free = np.ones(frame.shape, dtype=bool)
-    free[row[on], column[on]] = False
-    if free.all():
-        return ~free
-    return np.asarray(ndimage.distance_transform_edt(free) <= edit.radius / frame.pixel)
+    ends = np.concatenate([edit.points[1:], edit.points[-1:]])
+    under = pixels_along(np.stack([edit.points, ends], axis=1), frame)
+    if not under.any():
+        return under
+    return np.asarray(ndimage.distance_transform_edt(~under) <= edit.radius / frame.pixel)
 
 
 class _ResultCache(OrderedDict[object, Any]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import product
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,6 +23,7 @@ MARGIN: Final = 0.04  # empty border round a drawing, as a share of its longer s
 LEAST_R: Final = 0.5  # least R of a pixel with a direction: |cos d| at an angle d, 0.64 for a bend by 90
 LEAST_WEIGHT: Final = 0.1  # stroke pixels with a smaller w have no direction: grazed corners, crossings
 CUT: Final = 0.5 - 1e-9  # least length at which another stroke cuts a pixel out; more would leave gaps
+_AT_ONCE: Final = 1_000_000  # points along segments
 _NUDGE: Final = 1e-9  # of a pixel: a line exactly along a pixel edge is shared by both sides
 
 
@@ -67,16 +68,29 @@ class Cover:
         return np.where(single >= LEAST_R, np.minimum(1.0, self.amount) * single, 0.0)
 
 
+class CurvePixels(NamedTuple):
+    """Curve, row and column (k,) of each pixel that a curve covers, in the order of the curves.
+
+    A curve covers a pixel over LEAST_WEIGHT pixel sides and more; without such a curve, the longest counts.
+    """
+
+    curve: Indices
+    row: Indices
+    column: Indices
+
+
 @dataclass(frozen=True, eq=False)
 class Covers:
     """Covers by curvature lines and by the other strokes, which cut the field.
 
     stroke_width: typical width of the strokes in pixels, 0 for curves.
+    pixels: those of curvature lines, None for the ink of a picture.
     """
 
     lines: Cover
     others: Cover
     stroke_width: float = 0.0
+    pixels: CurvePixels | None = None
 
     @property
     def cuts(self) -> Bools:
@@ -92,6 +106,12 @@ class Covers:
     def filled(self) -> Bools:
         """The pixels [height, width] that are covered over half of their side or more."""
         return self.lines.amount + self.others.amount >= CUT
+
+
+def box_around(points: Floats) -> Box:
+    """Left, top, right and bottom of points (..., 2)."""
+    x, y = points[..., 0], points[..., 1]
+    return float(x.min()), float(y.min()), float(x.max()), float(y.max())
 
 
 def fit_frame(box: Box, size: int, *, margin: bool) -> Frame:
@@ -120,52 +140,76 @@ def fit_frame(box: Box, size: int, *, margin: bool) -> Frame:
 
 def cover_by_segments(segments: Floats, frame: Frame) -> Cover:
     """The cover by straight segments (m, 2, 2), each cut exactly at the pixel edges. Raises InputError."""
-    pieces = _cut_segments(segments, frame)
-    unit = pieces.unit
-    double = np.stack([np.ones(len(unit)), unit[:, 0] ** 2 - unit[:, 1] ** 2, -2 * unit[:, 0] * unit[:, 1]])
-    amount, cosine, sine = np.zeros((3, *frame.shape))
-    for nudge in product((-_NUDGE, _NUDGE), repeat=2):
-        cell, on_grid = _cells_of_points(pieces.middle + nudge, frame)
-        amount, cosine, sine = (
-            total + np.bincount(cell, value[on_grid], total.size).reshape(frame.shape)
-            for total, value in zip((amount, cosine, sine), pieces.covered / 4 * double, strict=True)
-        )
-    return Cover(amount, np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None])
+    return cut_segments(segments, frame).cover()
 
 
-def curve_pixels(segments: Floats, curve: Ints, frame: Frame) -> tuple[Indices, Indices, Indices]:
-    """Curve, row and column (k,) of each pixel that a curve covers, in the order of the curves.
+def pixels_along(segments: Floats, frame: Frame) -> Bools:
+    """The pixels [height, width] under points along segments (m, 2, 2), at most a row and a column apart.
 
-    curve: int (m,), 0 or more, the curve of each segment (m, 2, 2). A curve covers a pixel over LEAST_WEIGHT
-    pixel sides and more; without such a curve the longest one counts.
+    Unlike a cover, they leave out pixels whose corners a segment cuts off.
     """
-    pieces = _cut_segments(segments, frame)
-    number, size = curve[pieces.segment].astype(np.int64), frame.height * frame.width
-    keys, lengths = [], []
-    for nudge in product((-_NUDGE, _NUDGE), repeat=2):
-        cell, on_grid = _cells_of_points(pieces.middle + nudge, frame)
-        keys.append(number[on_grid] * size + cell)
-        lengths.append(pieces.covered[on_grid] / 4)
-    key, place = np.unique(np.concatenate(keys), return_inverse=True)
-    owner, pixel = np.divmod(key, size)
-    amount = np.bincount(place, np.concatenate(lengths), len(key))
-    most = np.zeros(size)
-    np.maximum.at(most, pixel, amount)
-    covers = amount >= np.minimum(LEAST_WEIGHT, most[pixel])
-    return owner[covers], *np.divmod(pixel[covers], frame.width)
+    segments, _ = _clip_segments((segments - (frame.x, frame.y)) / frame.pixel, frame)
+    step = segments[:, 1] - segments[:, 0]
+    count = np.ceil(np.maximum(*np.abs(step).T)).astype(np.int64) + 1
+    step /= np.maximum(count - 1, 1)[:, None]
+    pixels = np.zeros(frame.height * frame.width, dtype=bool)
+    for part in np.array_split(np.arange(len(segments)), 1 + count.sum() // _AT_ONCE):
+        owner, before = np.repeat(part, count[part]), np.cumsum(count[part]) - count[part]
+        number = np.arange(len(owner)) - np.repeat(before, count[part])
+        points = segments[owner, 0] + number[:, None] * step[owner]
+        pixels[_cells_of_points(points, frame)[0]] = True
+    return pixels.reshape(frame.shape)
 
 
 @dataclass(frozen=True, eq=False)
-class _Pieces:
+class Pieces:
     """Segments cut at the pixel edges, in pixels: segment, middle, length and unit vector of each piece."""
 
+    frame: Frame
     segment: Indices
     middle: Floats
     covered: Floats
     unit: Floats
 
+    def cover(self) -> Cover:
+        """The cover by these pieces."""
+        shape, unit = self.frame.shape, self.unit
+        double = np.stack(
+            [np.ones(len(unit)), unit[:, 0] ** 2 - unit[:, 1] ** 2, -2 * unit[:, 0] * unit[:, 1]]
+        )
+        amount, cosine, sine = np.zeros((3, *shape))
+        for nudge in product((-_NUDGE, _NUDGE), repeat=2):
+            cell, on_grid = _cells_of_points(self.middle + nudge, self.frame)
+            amount, cosine, sine = (
+                total + np.bincount(cell, value[on_grid], total.size).reshape(shape)
+                for total, value in zip((amount, cosine, sine), self.covered / 4 * double, strict=True)
+            )
+        direction = np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None]
+        return Cover(amount, direction)
 
-def _cut_segments(segments: Floats, frame: Frame) -> _Pieces:
+    def pixels(self, curve: Ints) -> CurvePixels:
+        """The pixels of curves. curve: int (m,), 0 or more, the curve of each segment."""
+        number, size = curve[self.segment].astype(np.int64), self.frame.height * self.frame.width
+        low, high = (np.floor(self.middle + nudge) for nudge in (-_NUDGE, _NUDGE))
+        is_shared = (low[:, 0] != high[:, 0]) | (low[:, 1] != high[:, 1])
+        some, share = np.arange(len(number)), np.where(is_shared, self.covered / 4, self.covered)
+        keys, lengths = [], []
+        for nudge in product((-_NUDGE, _NUDGE), repeat=2):
+            cell, on_grid = _cells_of_points(self.middle[some] + nudge, self.frame)
+            keys.append(number[some][on_grid] * size + cell)
+            lengths.append(share[some][on_grid])
+            some = np.flatnonzero(is_shared)  # the others lie in the same pixel with every nudge
+        key, place = np.unique(np.concatenate(keys), return_inverse=True)
+        owner, pixel = np.divmod(key, size)
+        amount = np.bincount(place, np.concatenate(lengths), len(key))
+        most = np.zeros(size)
+        np.maximum.at(most, pixel, amount)
+        covers = amount >= np.minimum(LEAST_WEIGHT, most[pixel])
+        return CurvePixels(owner[covers], *np.divmod(pixel[covers], self.frame.width))
+
+
+def cut_segments(segments: Floats, frame: Frame) -> Pieces:
+    """The pieces of straight segments (m, 2, 2) between pixel edges. Raises InputError for too many."""
     segments, number = _clip_segments((segments - (frame.x, frame.y)) / frame.pixel, frame)
     step = segments[:, 1] - segments[:, 0]
     length = vector_length(*step.T)
@@ -173,7 +217,8 @@ def _cut_segments(segments: Floats, frame: Frame) -> _Pieces:
     segments, step, length, number = segments[long], step[long], length[long], number[long]
     owner, start, end = _piece_ends(segments, step)
     middle = segments[owner, 0] + ((start + end) / 2)[:, None] * step[owner]
-    return _Pieces(number[owner], middle, (end - start) * length[owner], (step / length[:, None])[owner])
+    unit = (step / length[:, None])[owner]
+    return Pieces(frame, number[owner], middle, (end - start) * length[owner], unit)
 
 
 def _clip_segments(segments: Floats, frame: Frame) -> tuple[Floats, Indices]:
@@ -181,10 +226,10 @@ def _clip_segments(segments: Floats, frame: Frame) -> tuple[Floats, Indices]:
     start, step = segments[:, 0], segments[:, 1] - segments[:, 0]
     limit = np.array([frame.width, frame.height], dtype=float)
     with np.errstate(divide="ignore", invalid="ignore"):
-        walls = np.stack([-start / step, (limit - start) / step])
+        walls = -start / step, (limit - start) / step
     along = np.where((start >= 0) & (start <= limit), -np.inf, np.inf)  # for a segment along the walls
-    low = np.where(step == 0, along, walls.min(axis=0)).max(axis=1).clip(0, None)
-    high = np.where(step == 0, -along, walls.max(axis=0)).min(axis=1).clip(None, 1)
+    low = np.maximum(*np.where(step == 0, along, np.minimum(*walls)).T).clip(0, None)
+    high = np.minimum(*np.where(step == 0, -along, np.maximum(*walls)).T).clip(None, 1)
     inside = low < high
     start, step, low, high = start[inside], step[inside], low[inside, None], high[inside, None]
     return np.stack([start + low * step, start + high * step], axis=1), np.nonzero(inside)[0]
@@ -193,7 +238,7 @@ def _clip_segments(segments: Floats, frame: Frame) -> tuple[Floats, Indices]:
 def _piece_ends(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats]:
     """Segment number and the parameters of both ends of each piece between pixel edges."""
     count = len(segments)
-    low, high = segments.min(axis=1), segments.max(axis=1)
+    low, high = np.minimum(segments[:, 0], segments[:, 1]), np.maximum(segments[:, 0], segments[:, 1])
     first = np.floor(low) + 1
     crossings = np.maximum(np.ceil(high) - first, 0).astype(np.int64)
     if count + crossings.sum() > MAX_PIECES:
@@ -206,7 +251,10 @@ def _piece_ends(segments: Floats, step: Floats) -> tuple[Indices, Floats, Floats
         owners.append(owner)
         cuts.append((line - segments[owner, 0, axis]) / step[owner, axis])
     all_owners, all_cuts = np.concatenate(owners), np.concatenate(cuts).clip(0, 1)
-    order = np.lexsort((all_cuts, all_owners))
+    order = np.argsort(all_owners, kind="stable")
+    several = np.flatnonzero((crossings[:, 0] + crossings[:, 1] > 1)[all_owners[order]])
+    few = order[several]
+    order[several] = few[np.lexsort((all_cuts[few], all_owners[few]))]
     number, start = all_owners[order], all_cuts[order]
     end = np.ones(len(start))
     end[:-1] = np.where(number[1:] == number[:-1], start[1:], 1.0)

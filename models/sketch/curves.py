@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..input_limits import MAX_SEGMENTS
 from ..instance.domain import Bools, Floats, Ints
-from .cover import Box, Covers, Frame, cover_by_segments
+from .cover import Box, Covers, Frame, box_around, cut_segments
 
 STRAIGHT: Final = 0.99
 """Least chord of a straight line as a share of its length."""
@@ -51,12 +51,9 @@ class Curves:
     @property
     def box(self) -> Box:
         """Left, top, right, bottom of the curves, not of their control points."""
-        corners = self.points.reshape(-1, 2)
-        span = float(np.ptp(corners, axis=0).max())
-        if span > 0:
-            corners = flatten(self.points, _BOX_TOLERANCE * span)[0].reshape(-1, 2)
-        (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
-        return left, top, right, bottom
+        left, top, right, bottom = box_around(self.points)
+        span = max(right - left, bottom - top)
+        return box_around(flatten(self.points, _BOX_TOLERANCE * span)[0] if span > 0 else self.points)
 
     def segments(self, frame: Frame) -> tuple[Floats, Ints, Bools]:
         """Segments (m, 2, 2), the number (m,) of each segment's curve, and which (m,) are curvature lines."""
@@ -65,8 +62,9 @@ class Curves:
 
     def covers(self, frame: Frame) -> Covers:
         """The covers by curvature lines and by other strokes."""
-        segments, _, line = self.segments(frame)
-        return Covers(cover_by_segments(segments[line], frame), cover_by_segments(segments[~line], frame))
+        segments, curve, line = self.segments(frame)
+        pieces, others = cut_segments(segments[line], frame), cut_segments(segments[~line], frame)
+        return Covers(pieces.cover(), others.cover(), pixels=pieces.pixels(curve[line]))
 
 
 def lines_as_cubics(start: Floats, end: Floats) -> Floats:
@@ -75,9 +73,10 @@ def lines_as_cubics(start: Floats, end: Floats) -> Floats:
     return start[:, None] * (1 - thirds) + end[:, None] * thirds
 
 
-def are_straight(cubics: Floats) -> bool:
-    """Whether all cubics (k, 4, 2) are straight lines with even steps."""
-    return np.allclose(cubics, lines_as_cubics(cubics[:, 0], cubics[:, 3]), rtol=1e-9, atol=0)
+def are_straight(cubics: Floats) -> Bools:
+    """Which (k,) of cubics (k, 4, 2) are straight lines with even steps."""
+    lines = lines_as_cubics(cubics[:, 0], cubics[:, 3])
+    return np.isclose(cubics, lines, rtol=1e-9, atol=0).all(axis=(1, 2))
 
 
 def run_numbers(points: Floats, shape: Ints) -> Ints:
@@ -92,14 +91,18 @@ def flatten(points: Floats, tolerance: float) -> tuple[Floats, NDArray[np.intp]]
     Raises InputError for more than MAX_SEGMENTS segments.
     """
     # In n equal steps a cubic deviates by at most 3/4 M / n^2, M the longer second difference of its points.
-    bend = np.sqrt((np.diff(points, n=2, axis=1) ** 2).sum(axis=-1)).max(axis=1, initial=0.0)
+    turns = np.diff(points, n=2, axis=1) ** 2
+    bend = np.sqrt(np.maximum(*(turns[:, at, 0] + turns[:, at, 1] for at in (0, 1))))
     steps = np.clip(np.ceil(np.sqrt(0.75 * bend / tolerance)), 1, MAX_SEGMENTS + 1).astype(np.int64)
     if steps.sum() > MAX_SEGMENTS:
         raise InputError(f"has more than {MAX_SEGMENTS} segments; simplify it, or choose a smaller size")
     owner = np.repeat(np.arange(len(points)), steps)
     step = np.arange(len(owner)) - np.repeat(np.cumsum(steps) - steps, steps)
-    ends = [evaluate_cubics(points[owner], (step + side) / steps[owner]) for side in (0, 1)]
-    return np.stack(ends, axis=1), owner
+    segments, bent = points[:, [0, 3]][owner], np.flatnonzero(steps[owner] > 1)
+    for side in (0, 1):
+        at = owner[bent]
+        segments[bent, side] = evaluate_cubics(points[at], (step[bent] + side) / steps[at])
+    return segments, owner
 
 
 def cut_cubics(points: Floats, start: Floats, end: Floats) -> Floats:

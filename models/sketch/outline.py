@@ -8,7 +8,7 @@ import numpy as np
 
 from ..instance.angles import cosine, line_of, sine
 from ..instance.domain import Bools, Floats
-from .cover import LEAST_WEIGHT, Frame, curve_pixels
+from .cover import LEAST_WEIGHT, CurvePixels, Frame
 from .curves import Curves
 
 GAPS: Final = (0.03, 0.06, 0.12)  # shares of the longer side: gaps that count as closed, tried in turn
@@ -72,16 +72,15 @@ def keep_parts_with_strokes(region: Bools, weight: Floats) -> Bools:
     return np.asarray(is_part[label])
 
 
-def find_overshoots(curves: Curves, area: Bools, frame: Frame) -> Bools:
+def find_overshoots(curves: Curves, pixels: CurvePixels, area: Bools, frame: Frame) -> Bools:
     """The pixels [height, width] of an area that only ends of curvature lines reach.
 
-    Such an end lies inside of a part of the area, and most of its line in other parts.
+    Such an end lies inside of a part of the area, and most of its line in other parts. pixels: of the lines.
     """
     from scipy import ndimage
 
     label, count = ndimage.label(area)
-    segments, curve, is_line = curves.segments(frame)
-    owner, row, column = curve_pixels(segments[is_line], curve[is_line], frame)
+    owner, row, column = pixels
     piece, place, size = np.unique(
         owner * (count + 1) + label[row, column], return_inverse=True, return_counts=True
     )

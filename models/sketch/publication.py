@@ -60,7 +60,7 @@ def _paths_by_paint(curves: Curves) -> list[tuple[str, list[str]]]:
     for first, after in pairwise([*starts, len(curves.points)]):
         run, is_faint = curves.points[first:after], curves.faint is not None and curves.faint[first]
         paint = (_RED if curves.red[first] else "") + (_FAINT if is_faint else "")
-        straight = are_straight(run)
+        straight = bool(are_straight(run).all())
         if (paint, straight) != before or run[0, 0].tolist() == end:
             paths.append((paint, []))
         moves = f"L{_join_numbers(run[:, 3:])}" if straight else f"C{_join_numbers(run[:, 1:])}"

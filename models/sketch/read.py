@@ -180,8 +180,9 @@ def find_mask(drawing: Drawing, covers: Covers, frame: Frame) -> tuple[Bools, Re
     region = find_inside(walls)
     inner, weight = region & ~covers.cuts, covers.lines.weight
     mask = reached = keep_parts_with_strokes(inner, weight)
-    if isinstance(drawing, Curves):
-        mask = keep_parts_with_strokes(inner, np.where(find_overshoots(drawing, inner, frame), 0.0, weight))
+    if isinstance(drawing, Curves) and covers.pixels:
+        overshoots = find_overshoots(drawing, covers.pixels, inner, frame)
+        mask = keep_parts_with_strokes(inner, np.where(overshoots, 0.0, weight))
     if not mask.any():
         raise NoStrokeError(
             "its outline leaves no room for a curvature line on so coarse a grid; choose a larger size"
