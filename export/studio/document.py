@@ -9,6 +9,7 @@ import base64
 import hashlib
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
+from functools import cached_property
 from typing import Any, Final, Literal
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...models.errors import InputError, InstanceError, NoStrokeError, shortened
 from ...models.input_limits import MAX_SEGMENTS
 from ...models.instance.domain import Bools, Floats, Ints
 from ...models.instance.instance import STROKE_WEIGHT, name_from_text
-from ...models.sketch.cover import Box
+from ...models.sketch.cover import Box, box_around
 from ...models.sketch.curves import Curves, lines_as_cubics
 from ...models.sketch.read import Silhouette
 
@@ -153,25 +154,22 @@ class Document:
     @property
     def visible(self) -> Ints:
         """Numbers of the strokes that are read: not ignored, and longer than a point."""
-        read = [
-            number
-            for number, stroke in enumerate(self.strokes)
-            if stroke.mark != "ignored" and (stroke.points != stroke.points[0]).any()
-        ]
-        return np.array(read, dtype=np.int32)
+        return np.unique(self.segments[1])
 
+    @cached_property
     def segments(self) -> tuple[Floats, Ints]:
         """The straight parts (k, 2, 2) of the visible strokes, and the number (k,) of the stroke of each."""
-        visible = self.visible
-        points = [self.strokes[number].points for number in visible]
-        ends = [np.stack([part[:-1], part[1:]], axis=1) for part in points] or [np.empty((0, 2, 2))]
-        joined, owner = np.concatenate(ends), np.repeat(visible, [len(part) - 1 for part in points])
-        long = (joined[:, 0] != joined[:, 1]).any(axis=1)
-        return joined[long], owner[long]
+        points = np.concatenate([np.empty((0, 2)), *(stroke.points for stroke in self.strokes)])
+        owner = np.repeat(np.arange(len(self.strokes)), [len(stroke.points) for stroke in self.strokes])
+        is_read = np.array([stroke.mark != "ignored" for stroke in self.strokes], dtype=bool)[owner]
+        start, end = points[:-1], points[1:]
+        long = (start[:, 0] != end[:, 0]) | (start[:, 1] != end[:, 1])
+        long &= (owner[:-1] == owner[1:]) & is_read[1:]
+        return np.stack([start[long], end[long]], axis=1), owner[1:][long].astype(np.int32)
 
     def curves(self) -> Curves:
         """The visible strokes as curves with their numbers. Raises NoStrokeError without a curvature line."""
-        segments, owner = self.segments()
+        segments, owner = self.segments
         line: Bools = np.array([stroke.mark == "line" for stroke in self.strokes], dtype=bool)[owner]
         if not line.any():
             raise NoStrokeError("there is no curvature line yet; draw one, or mark a stroke as one")
@@ -181,8 +179,8 @@ class Document:
     def sheet(self) -> Box:
         """The page, enlarged to hold the visible strokes; x, y, width and height."""
         x, y, width, height = self.page
-        corners = np.concatenate([[[x, y], [x + width, y + height]], self.segments()[0].reshape(-1, 2)])
-        (left, top), (right, bottom) = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+        corners = np.concatenate([[[[x, y], [x + width, y + height]]], self.segments[0]])
+        left, top, right, bottom = box_around(corners)
         return left, top, right - left, bottom - top
 
     @property

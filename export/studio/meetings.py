@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ...models.instance.domain import Floats, Ints
-from ...models.sketch.cover import Frame, fit_frame
+from ...models.sketch.cover import Frame, box_around, fit_frame
 from ...models.sketch.meetings import GRID, find_meetings, resample
 from ...models.surface.trust import OFF
 from .document import Document
@@ -23,17 +23,14 @@ _MOST: Final = 5  # suspects at a time
 
 def frame_of(segments: Floats) -> Frame:
     """The grid on which strokes are compared, around their segments (k, 2, 2)."""
-    corners = segments.reshape(-1, 2)
-    return fit_frame((*corners.min(axis=0), *corners.max(axis=0)), GRID, margin=True)
+    return fit_frame(box_around(segments), GRID, margin=True)
 
 
-def lines_of(document: Document, frame: Frame) -> tuple[Ints, list[Floats]]:
-    """Numbers of the visible curvature lines, and their points about a pixel apart, in pixels."""
-    is_line = np.array([stroke.mark == "line" for stroke in document.strokes], dtype=bool)
-    numbers = document.visible[is_line[document.visible]]
-    return numbers, [
-        resample((document.strokes[number].points - (frame.x, frame.y)) / frame.pixel) for number in numbers
-    ]
+def lines_of(document: Document, frame: Frame) -> tuple[Floats, Ints]:
+    """Points of the visible curvature lines in pixels, and the stroke of each, as from `resample`."""
+    segments, stroke = document.segments
+    is_line = np.array([stroke.mark == "line" for stroke in document.strokes], dtype=bool)[stroke]
+    return resample((segments[is_line] - (frame.x, frame.y)) / frame.pixel, stroke[is_line])
 
 
 def find_suspects(document: Document, misfit: Floats) -> list[int]:
@@ -45,24 +42,23 @@ def find_suspects(document: Document, misfit: Floats) -> list[int]:
 
     misfit: mean deviation of the crosses at each stroke from a right angle on the surface, in radians.
     """
-    numbers, lines = lines_of(document, frame_of(document.segments()[0]))
-    long = np.array([len(line) > _LONG for line in lines], dtype=bool)
-    numbers, lines = numbers[long], [line for line in lines if len(line) > _LONG]
-    pairs, places = find_meetings(lines, most_ends=1)
+    points, owner = lines_of(document, frame_of(document.segments[0]))
+    long = np.bincount(owner)[owner] > _LONG
+    pairs, places = find_meetings(points[long], owner[long], most_ends=1)
     suspects: list[int] = []
     if not 0 < len(pairs) < _THICKET:
         return suspects
     spot = _join_places(places)
     while len(suspects) < _MOST and len(pairs):
-        triples = _count_triples(pairs, len(lines))
-        at_spot, where = np.unique(spot[:, None] * len(lines) + pairs, return_inverse=True)
+        triples = _count_triples(pairs, len(misfit))
+        at_spot, where = np.unique(spot[:, None] * len(misfit) + pairs, return_inverse=True)
         at_poles = _count_triples(where.reshape(pairs.shape), len(at_spot))
-        triples -= np.bincount(at_spot % len(lines), at_poles, len(lines))
+        triples -= np.bincount(at_spot % len(misfit), at_poles, len(misfit))
         most = np.flatnonzero(triples == triples.max())
-        worst = most[np.argmax(misfit[numbers[most]])]
-        if triples[worst] <= 0 or (len(most) > 1 and misfit[numbers[worst]] <= OFF):
+        worst = most[np.argmax(misfit[most])]
+        if triples[worst] <= 0 or (len(most) > 1 and misfit[worst] <= OFF):
             break
-        suspects.append(int(numbers[worst]))
+        suspects.append(int(worst))
         others = (pairs != worst).all(axis=1)
         pairs, spot = pairs[others], spot[others]
     return sorted(suspects)

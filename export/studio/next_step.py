@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Final, Literal
 
 from ...models.sketch.cover import CUT, cover_by_segments
 from ...models.sketch.meetings import find_meetings
 from ...models.sketch.outline import find_inside
 from .document import Document
 from .meetings import frame_of, lines_of
+
+_SOME: Final = 2000  # points of lines, among which most drawings have a meeting
 
 NextStep = Literal["outline", "line", "across", ""]
 
@@ -20,13 +22,13 @@ def find_next_step(document: Document) -> NextStep:
     have the least energy. Where two lines cross, both lines of the cross are given, and smoothness carries
     them on. So a field counts as determined once two curvature lines meet at a clear angle.
     """
-    segments = document.segments()[0]
+    segments = document.segments[0]
     if not len(segments):
         return "outline"
     frame = frame_of(segments)
-    lines = lines_of(document, frame)[1]
-    if len(find_meetings(lines)[0]):
+    points, owner = lines_of(document, frame)
+    if any(len(find_meetings(points[:some], owner[:some])[0]) for some in (_SOME, len(points))):
         return ""
     if not document.mask and find_inside(cover_by_segments(segments, frame).amount >= CUT).all():
         return "outline"
-    return "across" if lines else "line"
+    return "across" if len(points) else "line"

@@ -445,14 +445,9 @@ def _are_crossed(points: Floats, number: Ints, weak: Bools, is_line: Bools) -> B
     pixel = float(np.ptp(points.reshape(-1, 2), axis=0).max()) / GRID
     kept = weak | is_line
     segments, owner = flatten(points[kept], pixel / 10)
-    first = np.flatnonzero(np.diff(number[kept][owner], prepend=-1))
-    parts = np.split(segments / pixel, first[1:])
-    pairs = find_meetings(
-        [resample(np.concatenate([part[:, 0], part[-1:, 1]])) for part in parts], most_ends=0
-    )[0]
-    own = number[kept][owner[first]]
-    is_weak = weak[kept][owner[first]]
-    return np.isin(number, own[pairs[is_weak[pairs] & ~is_weak[pairs][:, ::-1]]]) & weak
+    pairs = find_meetings(*resample(segments / pixel, number[kept][owner]), most_ends=0)[0]
+    is_weak = np.isin(pairs, number[weak])
+    return np.isin(number, pairs[is_weak & ~is_weak[:, ::-1]]) & weak
 
 
 def _list_unread(
