@@ -62,6 +62,6 @@ def main(page: Path, _: Sequence[str]) -> None:
     write_rows("performance/studio.csv", rows)
     facts, last = machine_facts(), rows[-1]
     where = f"{facts['processor']}, Python {facts['python']}, load average {facts['load']:.1f}"
-    seconds = f"{last['field']} for the field, {last['surface']} more for the surface"
+    seconds = f"{last['field']} for the field, {last['surface']} for the surface"
     text = f"CPU seconds among {last['strokes']} strokes: {seconds}. {where}. Medians of {RUNS} drawings."
     replace_between(page, "studio", text)
