@@ -158,7 +158,8 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
         )
         curves = _trace_strokes(framed, page, window, unread, difference, has_choice=matcher is not None)
     else:
-        seen, notes = see_strokes(framed, window, shapes, background or choose_paper(shapes))
+        is_line = np.array([_is_curvature_line(shape, matcher) for shape in shapes])
+        seen, notes = see_strokes(framed, window, shapes, background or choose_paper(shapes), is_line=is_line)
         curves = _join_strokes(shapes, seen, page, matcher, (*notes, *unread))
     for values in (curves.points, curves.curve, curves.red, curves.chosen, curves.faint):
         if values is not None:

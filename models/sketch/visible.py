@@ -97,12 +97,12 @@ class _LineSamples:
 
 
 def see_strokes(
-    root: Element, window: Box, shapes: Sequence[PaintedShape], paper: str
+    root: Element, window: Box, shapes: Sequence[PaintedShape], paper: str, *, is_line: Bools
 ) -> tuple[list[Seen], tuple[str, ...]]:
     """The visible part of each shape, and notes on the strokes that are left out. Raises InputError.
 
     root: the drawing, framed by the window: x, y, width and height. Its shapes get other styles. paper: the
-    colour behind it, as #rrggbb.
+    colour behind it, as #rrggbb. is_line: which shapes are curvature lines.
     """
     pixel = max(window[2:]) / max(int(root.attrib[side]) for side in ("width", "height"))
     samples = _sample_lines(shapes, window, pixel)
@@ -134,7 +134,7 @@ def see_strokes(
         number = np.arange(len(own))
         front = fronts[place, number]
         colour, difference, contrast, own = look(samples.pixels[place, number])
-        visible = _decide(samples, shapes, front, contrast=contrast, own=own, pixel=pixel)
+        visible = _decide(samples, shapes, front, is_line, contrast=contrast, own=own, pixel=pixel)
         # A stroke in the colour of its ground is none, and needs no note.
         notes = _describe_hidden(samples, shapes, ~visible & (front != 2 * samples.shape))
     colour[~_shows_colour(samples, visible & contrast, front, own)] = np.nan
@@ -298,6 +298,7 @@ def _decide(
     samples: _LineSamples,
     shapes: Sequence[PaintedShape],
     front: Indices,
+    is_line: Bools,
     *,
     contrast: Bools,
     own: Bools,
@@ -308,6 +309,8 @@ def _decide(
     state = np.where(is_crossed, _CROSSED, np.where(contrast, _VISIBLE, _HIDDEN))
     width = np.maximum(np.array([shape.width for shape in shapes]) / pixel, _LEAST_WIDTH)
     limit = np.where(is_crossed, _MEETING * width[front.clip(0) // 2], _GLITCH)
+    # A curvature line goes on below a line that cuts the field, as where both run along a silhouette.
+    limit[is_crossed & is_line[samples.shape] & ~is_line[front.clip(0) // 2]] = np.inf
     starts = np.flatnonzero((np.diff(samples.run, prepend=-1) != 0) | (np.diff(state, prepend=-1) != 0))
     length = np.add.reduceat(samples.length, starts)
     part, run = state[starts], samples.run[starts]
