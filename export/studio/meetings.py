@@ -12,12 +12,12 @@ from scipy.spatial import KDTree
 from ...models.instance.domain import Floats, Ints
 from ...models.sketch.cover import Frame, box_around, fit_frame
 from ...models.sketch.meetings import GRID, find_meetings, resample
-from ...models.surface.trust import OFF
 from .document import Document
 
 _LONG: Final = 8  # pixels of a stroke that can be suspected; links in junctions of a picture are shorter
 _SPOT: Final = 2.0  # pixels between meetings at one place
 _THICKET: Final = 20_000  # pairs of lines that meet, from which on no net can be told
+_MISFIT: Final = np.radians(15)  # from which a stroke does not fit the surface
 _MOST: Final = 5  # suspects at a time
 
 
@@ -37,8 +37,8 @@ def find_suspects(document: Document, misfit: Floats) -> list[int]:
     """Numbers of the strokes, at most a few, that are probably no curvature lines.
 
     Curvature lines of one family never cross, so one of three lines that all cross each other is none. The
-    stroke in most such triples is suspected; of several, the one that fits the surface least, unless even
-    that fits. Lines may meet at a pole, in one place or at their ends.
+    stroke in most such triples is suspected if it alone is in all of them, or if it does not fit the surface;
+    of several, the one that fits least. Lines may meet at a pole, in one place or at their ends.
 
     misfit: mean deviation of the crosses at each stroke from a right angle on the surface, in radians.
     """
@@ -56,7 +56,8 @@ def find_suspects(document: Document, misfit: Floats) -> list[int]:
         triples -= np.bincount(at_spot % len(misfit), at_poles, len(misfit))
         most = np.flatnonzero(triples == triples.max())
         worst = most[np.argmax(misfit[most])]
-        if triples[worst] <= 0 or (len(most) > 1 and misfit[worst] <= OFF):
+        is_sole = len(most) == 1 and 3 * triples[worst] == triples.sum()
+        if triples[worst] <= 0 or not (is_sole or misfit[worst] > _MISFIT):
             break
         suspects.append(int(worst))
         others = (pairs != worst).all(axis=1)

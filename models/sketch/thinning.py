@@ -11,18 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..instance.angles import vector_length
-from ..instance.domain import Bools, Floats
+from ..instance.domain import Bools, Floats, Ints
 
 _SMOOTH: Final = 2.0  # pixels over which a traced line is smoothed
 _SHORTEST: Final = 6  # pixels of a traced line; shorter ones, or than a stroke is wide, are burrs
 _SHORTEST_LINK: Final = 4  # pixels of a traced line between two junctions
-_LINK: Final = 2.0  # pens that a link inside a junction is long
-_REACH: Final = 5.0  # pens from the end of a way to that of another one across a junction
-_TURN: Final = np.radians(35)  # greatest angle between a way and its continuation; least one at a corner
-_APART: Final = 2.5  # pens between their places half-way
+_LINK: Final = 4.5  # pens that a link inside a junction is long, where lines cross at a small angle
+_REACH: Final = 6.0  # pens from the end of a way to that of another one across a junction
+_TURN: Final = np.radians(30)  # greatest angle between a way and its continuation; least one at a corner
+_APART: Final = 1.5  # pens between their places half-way
+_ASIDE: Final = 0.5  # cost of each line by which more leave a junction to one side of a continuation
 _INKED: Final = 0.9  # least share of the distance between their ends that has ink
 _SKIP: Final = 1.5  # pens at the end of a way, where thinned strokes turn aside
-_FAR: Final = 12.0  # pens of a way that show how it goes on
+_FAR: Final = 20.0  # pens of a way that show how it goes on
 _ARM: Final = 3.0  # pens to either side of a corner, within which a line turns
 _AROUND: Final = ((0, 1), (1, 0), (0, -1), (-1, 0), (1, 1), (1, -1), (-1, -1), (-1, 1))
 
@@ -52,7 +53,7 @@ def trace_shape(shape: Bools, *, trim: bool = False) -> list[NDArray[np.int64]]:
 def join_ways(ways: Sequence[NDArray[np.int64]], pen: float, ink: Bools) -> list[NDArray[np.int64]]:
     """Traced lines from corner to corner, joined where one continues another one, the straightest first.
 
-    pen: width of the strokes in pixels. Lines of less than two pens between two junctions lie inside one.
+    pen: width of the strokes in pixels. Short lines between two junctions lie inside one.
     ink: the picture [h, w], which has ink between ends that are joined.
     """
     from scipy.spatial import KDTree
@@ -76,8 +77,11 @@ def join_ways(ways: Sequence[NDArray[np.int64]], pen: float, ink: Bools) -> list
     ahead = slope + 2 * back * bend
     turn = _angle_between(ahead[:, 0], -ahead[:, 1])
     is_smooth = has_ink & (turn < _TURN) & (apart < _APART)
+    pairs, cost = pairs[is_smooth], (turn / _TURN + apart)[is_smooth]
+    away = np.array([side[min(int(_REACH * pen), len(side) - 1)] for side in sides])
+    cost += _ASIDE * _count_aside(pairs, ends, away, is_long, _REACH * pen)
     after = np.full(len(sides), -1)
-    for pair in pairs[is_smooth][np.argsort((turn / _TURN + apart)[is_smooth], kind="stable")]:
+    for pair in pairs[np.argsort(cost, kind="stable")]:
         if (after[pair] < 0).all():
             after[pair] = pair[::-1]
     joined, used = [], np.zeros(len(ways), dtype=bool)
@@ -90,6 +94,26 @@ def join_ways(ways: Sequence[NDArray[np.int64]], pen: float, ink: Bools) -> list
         if parts:
             joined.append(np.concatenate([*parts, parts[0][:1]] if end >= 0 else parts))
     return joined
+
+
+def _count_aside(pairs: Ints, ends: Ints, away: Ints, counts: Bools, reach: float) -> Floats:
+    """How many more of the other lines at each pair (k, 2) leave to one of its sides than to the other one.
+
+    Lines that cross have each other on both sides. ends, away: the end of each line and a place on it,
+    (n, 2). counts: which of them count, where they end within a distance.
+    """
+    from scipy.spatial import KDTree
+
+    middle, others = ends[pairs].mean(axis=1), np.flatnonzero(counts)
+    near = KDTree(ends[others]).query_ball_point(middle, reach)
+    at = np.repeat(np.arange(len(pairs)), [len(around) for around in near])
+    other = others[np.concatenate([*near, []]).astype(int)]
+    is_third = (other[:, None] != pairs[at]).all(axis=1)
+    at, other = at[is_third], other[is_third]
+    first, second = (np.arctan2(*(away[side] - middle).T) for side in pairs.T)
+    angle = np.arctan2(*(away[other] - middle[at]).T)
+    is_between = (angle - first[at]) % (2 * np.pi) < ((second - first) % (2 * np.pi))[at]
+    return np.abs(np.bincount(at, np.where(is_between, 1.0, -1.0), len(pairs)))
 
 
 def _fit_end(side: NDArray[np.int64], pen: float) -> Floats:
