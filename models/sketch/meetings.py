@@ -9,9 +9,7 @@ import numpy as np
 from ..instance.angles import line_difference
 from ..instance.domain import Floats, Ints
 
-GRID: Final = (
-    48  # pixels of the longer side of the grid on which lines are compared, for fields of every size
-)
+GRID: Final = 48  # pixels of the longer side of the grid on which lines of any field are compared
 _NEAR: Final = 1.5  # pixels between two lines that meet
 _CROWD: Final = 4  # points of one direction in a pixel: more of them meet nothing else
 _APART: Final = np.radians(30)  # least angle between lines of two families; strokes tremble by less
