@@ -310,11 +310,8 @@ TWO_COLOURS = f'{OUTLINE}<path d="{LINES}" {RED}/>'
 
 
 def test_a_part_without_a_curvature_line_is_left_out():
-    ring = (
-        f'<circle cx="50" cy="50" r="40" {BLACK}/><circle cx="50" cy="50" r="15" {BLACK}/>'
-        f'<circle cx="50" cy="50" r="28" {RED}/>'
-    )
-    instance = read(svg(ring), 60)
+    ring = f'<circle cx="50" cy="50" r="15" {BLACK}/><circle cx="50" cy="50" r="28" {RED}/>'
+    instance = read(svg(OUTLINE + ring), 60)
     assert not instance.mask[30, 30]
     assert instance.grid.parts == 1
     assert ndimage.binary_fill_holes(instance.mask).sum() > instance.mask.sum() + 100
@@ -322,8 +319,7 @@ def test_a_part_without_a_curvature_line_is_left_out():
 
 @for_each("slope", [0.03, 0.6, 3])
 def test_a_cutting_line_leaves_no_gap(slope):
-    rise = 40 * slope / max(1, slope)
-    run = rise / slope
+    run, rise = (40 * side / max(1, slope) for side in (1, slope))
     cut = f"M10 10H90V90H10ZM{50 - run} {50 + rise}L{50 + run} {50 - rise}"
     body = f'<path d="{cut}" {BLACK}/><path d="M20 30L80 70M30 20L70 80" {RED}/>'
     assert read(svg(body), 50).grid.parts == 2
