@@ -20,6 +20,8 @@ Ink = NDArray[np.float32]
 _LIGHT_SIDE: Final = 256  # blocks on the longer side in which the light on the paper is found
 _SHADOW: Final = 0.1  # of the longer side: darker and wider regions are shadows, not ink
 _DARKEST_SHADOW: Final = 0.25  # of the paper's level: darker and wide regions are solid ink after all
+_PURE: Final = 0.2  # of the paper's level: paper that has less of a colour says nothing of that colour
+_OTHER: Final = 0.05  # least difference of a stroke's colour from the paper's in a channel
 _EVEN: Final = 1.05  # light that differs by less counts as even, and the picture is not changed
 _PAPER_SIDE: Final = 64  # blocks on the longer side whose most frequent colour is that of the paper
 _LEAST_BLOCK: Final = 8.0  # pixels on a side of a block
@@ -38,7 +40,7 @@ def relative_to_paper(pixels: NDArray[np.uint8]) -> Floats:
     paper = _find_usual_colours(pixels)
     dark, light = _weigh_strokes(pixels, paper)
     if light <= _BOTH * dark:
-        return _relative_to_light_paper(pixels)
+        return _relative_to_light_paper(pixels, paper)
     colours = _darken_lighter_strokes(pixels, paper)
     if dark > _BOTH * light:
         for channel in range(pixels.shape[-1]):
@@ -108,31 +110,46 @@ def _darken_lighter_strokes(pixels: NDArray[np.uint8], paper: Ink) -> Floats:
     return colours
 
 
-def _relative_to_light_paper(pixels: NDArray[np.uint8]) -> Floats:
+def _relative_to_light_paper(pixels: NDArray[np.uint8], usual: Ink) -> Floats:
     """Colours of darker strokes relative to the paper."""
     # At least a quarter of a drawing is bare paper, so the upper quartile is a level of the paper.
     level = np.percentile(pixels.reshape(-1, pixels.shape[-1]), 75, axis=0).astype(np.float32)
     colours: Floats = pixels.astype(np.float32)
     colours /= np.maximum(level, 1)
-    light = _estimate_light(colours)
-    if max(float(light.max()), 1 / float(light.min())) > _EVEN:
-        colours /= light[..., None]
+    light = _estimate_light(colours, usual / np.maximum(level, 1))
+    if max(float(light.max()), 1 / max(float(light.min()), _PURE)) > _EVEN:
+        for channel in range(pixels.shape[-1]):
+            ground = _enlarge(light[..., channel], pixels.shape[:2])
+            colours[..., channel] /= np.maximum(ground, _PURE)
+            colours[..., channel][ground < _PURE] = np.inf
+        # On paper of a pure colour, strokes show in the other channels only.
+        np.copyto(colours, colours.min(axis=-1, keepdims=True), where=np.isinf(colours))
     return np.minimum(colours, 1, out=colours)
 
 
-def _estimate_light(colours: Floats) -> Ink:
-    """The light on the paper [h, w], 1 where it equals the light of the whole picture."""
+def _estimate_light(colours: Floats, usual: Floats | Ink) -> Ink:
+    """The light on the paper in blocks [rows, columns, channels], 1 where it is that of the whole picture.
+
+    An area of another colour, such as a card or a body that is filled, is paper in light of that colour.
+    usual: the most frequent colours, as from `_find_usual_colours`, relative to the paper of the picture.
+    """
     from scipy import ndimage
 
     # A grey closing lets lighter surroundings cover darker regions narrower than _SHADOW, in linear time. So
     # strokes vanish, and shadows stay, whether gradual or sharp. Means over blocks remove noise first.
-    height, width = colours.shape[:2]
+    height, width, channels = colours.shape
     block = max(1, max(height, width) // _LIGHT_SIDE)
     rows, columns = (np.append(np.arange(0, side, block), side) for side in (height, width))
-    coarse = block_means(colours.mean(axis=-1), rows, columns)
-    closed = ndimage.grey_closing(coarse, size=int(_SHADOW * max(coarse.shape)) | 1, mode="nearest")
-    smooth = ndimage.gaussian_filter(np.maximum(closed, _DARKEST_SHADOW), 1.0, mode="nearest")
-    return _enlarge(smooth, colours.shape[:2])
+    coarse = np.stack([block_means(colours[..., each], rows, columns) for each in range(channels)], axis=-1)
+    # Some colour of a stroke may be lighter than its ground, as red on a blue card.
+    ground = np.stack([_enlarge(part, coarse.shape[:2]) for part in np.moveaxis(usual, -1, 0)], axis=-1)
+    lighter, darker = ((side > _OTHER).any(axis=-1) for side in (coarse - ground, ground - coarse))
+    coarse = np.where((lighter & darker)[..., None], ground, coarse)
+    size = int(_SHADOW * max(coarse.shape)) | 1
+    closed = ndimage.grey_closing(coarse, (size, size, 1), mode="nearest")
+    is_solid = closed.mean(axis=-1) < _DARKEST_SHADOW
+    closed[is_solid] = np.maximum(closed[is_solid], _DARKEST_SHADOW)
+    return np.asarray(ndimage.gaussian_filter(closed, (1.0, 1.0, 0.0), mode="nearest"), dtype=np.float32)
 
 
 def _enlarge(blocks: Floats | Ink, shape: tuple[int, ...]) -> Ink:
