@@ -31,6 +31,7 @@ _FAR: Final = 40  # pixels beyond a side up to which there must
 _STEP: Final = 0.1  # least difference from the sheet, relative to its brightness
 _SAME: Final = 0.02  # difference of colours that is noise
 _EVEN: Final = 0.004  # one level: half of a photographed table differs by more from its usual colour
+_GROUND: Final = 0.25  # of what surrounds a sheet: least part that is even light ground
 _OTHERS: Final = 0.25  # of the ink of a sheet: more ink outside of it belongs to the drawing
 _DARK: Final = 0.1  # brightness below which differences count less
 _SUPPORT: Final = 0.75  # least share of a side, and of the places beyond it, with other colours
@@ -150,11 +151,19 @@ def find_sheet(coarse: NDArray[np.uint8], factor: int, picture: tuple[int, int])
 def _is_one_of_several(quad: _Quad) -> bool:
     """Whether a quadrilateral lies on even ground, unlike in photos, and much of the ink outside of it."""
     height, width = quad.colours.shape[:2]
-    around = PhotographedSheet(quad.offset_sides(np.full((4, 2), 2.0 * _WIDE)), (width, height), None)
-    inside = around.find_pixels((height, width), 1)
-    parts = [quad.colours[area] for area in (inside, ~inside)]
-    ink, outer = (np.abs(part - np.median(part, axis=0)).max(axis=-1) for part in parts)
-    if not len(outer) or (outer < _EVEN).mean() < 0.5:
+    size = width, height
+    inside, near = (
+        PhotographedSheet(quad.offset_sides(np.full((4, 2), reach)), size, None).find_pixels(size[::-1], 1)
+        for reach in (2.0 * _WIDE, 4.0 * _WIDE)
+    )
+    beside = quad.colours[near & ~inside]
+    if not len(beside):
+        return False
+    paper, ground = (np.median(part, axis=0) for part in (quad.colours[inside], beside))
+    ink = np.abs(quad.colours[inside] - paper).max(axis=-1)
+    outer = np.abs(quad.colours[~inside] - ground).max(axis=-1)
+    # Other sheets may lie on most of a light ground.
+    if (outer < _EVEN).mean() < (_GROUND if ground.mean() > paper.mean() / 2 else 0.5):
         return False
     return bool((outer > _STEP).sum() > _OTHERS * (ink > _STEP).sum())
 
