@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from operator import itemgetter
 from typing import Final
 
@@ -24,8 +24,10 @@ from .trust import confidence_of, right_angle_deviation
 
 FIRST: Final = Weights(even=1e-4, facing=1e-2)  # stiff, so that starts converge to the same surface
 WEIGHTS: Final = Weights(even=1e-6, facing=5e-5, forgiven=FORGIVEN)  # found on surfaces of docs/surface.md
-CLEARLY: Final = 0.95  # ratio of energies below which a plane's surface is preferred to the dome's
+CLEARLY: Final = 0.98  # ratio of energies below which a later start is preferred, the dome being the first
 TELLING: Final = np.radians(10)  # least slant of a hint that distinguishes z from -z
+_CLOSE: Final = 1.15  # ratio to the least energy of a level up to which a start is solved on the next one
+_SAME: Final = 0.003  # relative difference of energies below which two starts have reached the same surface
 _LEVEL: Final = 0.05  # ratio of sum to size of the leanings at the border below which neither side is outward
 
 
@@ -42,9 +44,9 @@ def surface(
     """Surface whose curvature lines look most like the crosses of a field, seen from the front.
 
     One height at each corner of a pixel, found by minimising the energy of `Equations` from three starts on
-    a coarse grid, and then on finer ones. Neither the order of the two lines nor jumps matter. Parts of the
-    mask that share no corner are independent; the mean height of each is 0. Deterministic unless `stop` ends
-    it. See docs/surface.md.
+    a coarse grid, and from the best of them on finer ones. Neither the order of the two lines nor jumps
+    matter. Parts of the mask that share no corner are independent; the mean height of each is 0.
+    Deterministic unless `stop` ends it. See docs/surface.md.
 
     A surface that is turned inside out, z to -z, has the same crosses. So each part leans outward at its
     border on the whole. Where that is undecided, it leans upward, as a floor seen from above.
@@ -110,25 +112,29 @@ def surface(
 
 
 def _solve_part(part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool) -> Floats:
-    """The minimum-energy heights: all starts are solved on the coarsest level, the best on all finer ones."""
-    coarsest, *finer = levels_of(part)
-    dome, *planes = ([*_from_start(coarsest, z, hints, is_over, flip=flip)] for z in coarsest.initial_heights)
-    candidates = [*dome, *((energy / CLEARLY, z) for plane in planes for energy, z in plane)]
-    (_, z), coarse = min(candidates, key=itemgetter(0)), coarsest
-    for level in finer:
-        z = _descend_with_hints(level, level.interpolate(coarse, z), hints, is_over)[1]
-        coarse = level
+    """The heights of least energy, from all starts on the coarsest level and the promising ones on others."""
+    level, *finer = levels_of(part)
+    stiff = Equations(level.stencils, level.crosses, FIRST)
+    starts = [_orient(level, descend(stiff, z, is_over)[1], flip=flip) for z in level.initial_heights]
+    reached = _descend_with_hints(level, starts, hints, is_over)
+    if _decide_side(hints):
+        turned = _descend_with_hints(level, [-z for z in starts], hints, is_over)
+        reached = [min(sides, key=itemgetter(0)) for sides in zip(reached, turned, strict=True)]
+    for fine in finer:
+        starts = [fine.interpolate(level, z) for z in _find_promising(reached)]
+        level, reached = fine, _descend_with_hints(fine, starts, hints, is_over)
+    least = min(energy for energy, _ in reached)
+    z = next(z for energy, z in reached if CLEARLY * energy <= least)
     return z if hints else _orient(part, z, flip=flip)
 
 
-def _from_start(
-    level: GridLevel, z: Floats, hints: Sequence[Hint], is_over: IsOver, *, flip: bool
-) -> Iterator[tuple[float, Floats]]:
-    """Energies and heights reached from a start, with hints from the possible sides."""
-    _, z = descend(Equations(level.stencils, level.crosses, FIRST), z, is_over)
-    z = _orient(level, z, flip=flip)
-    for side in (z, -z) if _decide_side(hints) else (z,):
-        yield _descend_with_hints(level, side, hints, is_over)
+def _find_promising(reached: Sequence[tuple[float, Floats]]) -> list[Floats]:
+    """The heights that may lead to the least energy on a finer level, those of equal energies once."""
+    least, kept = min(energy for energy, _ in reached), dict[float, Floats]()
+    for energy, z in reached:
+        if energy <= _CLOSE * least and all(abs(energy - other) > _SAME * other for other in kept):
+            kept[energy] = z
+    return list(kept.values())
 
 
 def _decide_side(hints: Sequence[Hint]) -> bool:
@@ -137,11 +143,12 @@ def _decide_side(hints: Sequence[Hint]) -> bool:
 
 
 def _descend_with_hints(
-    level: GridLevel, z: Floats, hints: Sequence[Hint], is_over: IsOver
-) -> tuple[float, Floats]:
-    """The energy and heights reached from z by descent, with the hints."""
+    level: GridLevel, starts: Iterable[Floats], hints: Sequence[Hint], is_over: IsOver
+) -> list[tuple[float, Floats]]:
+    """The energy and heights reached from each start by descent, with the hints."""
     extra = [hint_rows(hint, level) for hint in hints]
-    return descend(Equations(level.stencils, level.crosses, WEIGHTS, extra), z, is_over)
+    equations = Equations(level.stencils, level.crosses, WEIGHTS, extra)
+    return [descend(equations, z, is_over) for z in starts]
 
 
 def _orient(level: GridLevel, z: Floats, *, flip: bool) -> Floats:
