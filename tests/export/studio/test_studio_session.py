@@ -273,10 +273,9 @@ GAPS = [(20, 20, 180, 20, 180, 180, 20, 180, 20, 20), (50, 100, 95, 100), (108, 
 ARC = 20 * np.exp(1j * np.linspace(0, np.pi, 41)).imag
 ARCS = [np.stack([np.linspace(20, 180, 41), ARC + y], axis=1).ravel().tolist() for y in (60, 100)]
 ASLANT = [*ARCS, (20, 120, 180, 40), (20, 160, 180, 80)]  # links are left where they cross
-LINES = [(GRID, 6 * [1]), (GAPS, [0, 0, 1, 1, 1, 1]), (ASLANT, [0, 0, 0, 1, 1, 1, 1])]
 
 
-@for_each("lines, is_long", LINES)
+@for_each("lines, is_long", [(GRID, 6 * [1]), (GAPS, [0, 0, 1, 1, 1, 1]), (ASLANT, [0, 0, 0, 1, 1, 1, 1])])
 def test_lines_of_a_picture_continue_across_junctions_and_end_at_corners_and_gaps(lines, is_long):
     image = Image.new("RGB", (200, 200), "white")
     for places in lines:
