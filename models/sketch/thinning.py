@@ -18,7 +18,8 @@ _SHORTEST: Final = 6  # pixels of a traced line; shorter ones, or than a stroke 
 _SHORTEST_LINK: Final = 4  # pixels of a traced line between two junctions
 _LINK: Final = 4.5  # pens that a link inside a junction is long, where lines cross at a small angle
 _REACH: Final = 6.0  # pens from the end of a way to that of another one across a junction
-_TURN: Final = np.radians(30)  # greatest angle between a way and its continuation; least one at a corner
+_TURN: Final = np.radians(30)  # greatest angle between a way and its continuation
+_CORNER: Final = np.radians(35)  # least angle at a corner
 _APART: Final = 1.5  # pens between their places half-way
 _ASIDE: Final = 0.5  # cost of each line by which more leave a junction to one side of a continuation
 _INKED: Final = 0.9  # least share of the distance between their ends that has ink
@@ -140,7 +141,7 @@ def _split_at_corners(way: NDArray[np.int64], arm: int) -> list[NDArray[np.int64
 
     turn = _angle_between(run(-arm, 0), run(0, arm))
     around = _angle_between(run(-3 * arm, -arm), run(arm, 3 * arm))
-    turn = np.where(turn > np.maximum(_TURN, around / 2), turn, 0.0)
+    turn = np.where(turn > np.maximum(_CORNER, around / 2), turn, 0.0)
     corners = at[(turn > 0) & (turn == ndimage.maximum_filter1d(turn, 2 * arm + 1))]
     corners = corners[np.diff(corners, prepend=-arm) > arm]
     return [way[first : last + 1] for first, last in pairwise([0, *corners.tolist(), len(way) - 1])]
