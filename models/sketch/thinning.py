@@ -98,21 +98,21 @@ def join_ways(ways: Sequence[NDArray[np.int64]], pen: float, ink: Bools) -> list
 
 
 def _count_aside(pairs: Ints, ends: Ints, away: Ints, counts: Bools, reach: float) -> Floats:
-    """How many more of the other lines at each pair (k, 2) leave to one of its sides than to the other one.
+    """How many more third lines leave the junction of each pair (k, 2) to one side than to the other; (k,).
 
-    Lines that cross have each other on both sides. ends, away: the end of each line and a place on it,
-    (n, 2). counts: which of them count, where they end within a distance.
+    Lines that cross have each other on both sides. ends, away: the end of each line (n, 2) in pixels, and a
+    place on it. counts: which lines (n,) count as third ones. reach: pixels from the pair to their ends.
     """
     from scipy.spatial import KDTree
 
-    middle, others = ends[pairs].mean(axis=1), np.flatnonzero(counts)
-    near = KDTree(ends[others]).query_ball_point(middle, reach)
+    middle, numbers = ends[pairs].mean(axis=1), np.flatnonzero(counts)
+    near = KDTree(ends[numbers]).query_ball_point(middle, reach)
     at = np.repeat(np.arange(len(pairs)), [len(around) for around in near])
-    other = others[np.concatenate([*near, []]).astype(int)]
-    is_third = (other[:, None] != pairs[at]).all(axis=1)
-    at, other = at[is_third], other[is_third]
+    third = numbers[np.concatenate([*near, []]).astype(int)]
+    is_apart = (third[:, None] != pairs[at]).all(axis=1)
+    at, third = at[is_apart], third[is_apart]
     first, second = (np.arctan2(*(away[side] - middle).T) for side in pairs.T)
-    angle = np.arctan2(*(away[other] - middle[at]).T)
+    angle = np.arctan2(*(away[third] - middle[at]).T)
     is_between = (angle - first[at]) % (2 * np.pi) < ((second - first) % (2 * np.pi))[at]
     return np.abs(np.bincount(at, np.where(is_between, 1.0, -1.0), len(pairs)))
 

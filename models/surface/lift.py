@@ -112,7 +112,7 @@ def surface(
 
 
 def _solve_part(part: GridLevel, hints: Sequence[Hint], is_over: IsOver, *, flip: bool) -> Floats:
-    """The heights of least energy, from all starts on the coarsest level and the promising ones on others."""
+    """Minimum-energy heights: all starts are solved on the coarsest level, promising ones on finer levels."""
     level, *finer = levels_of(part)
     stiff = Equations(level.stencils, level.crosses, FIRST)
     starts = [_orient(level, descend(stiff, z, is_over)[1], flip=flip) for z in level.initial_heights]

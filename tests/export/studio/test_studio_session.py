@@ -258,8 +258,7 @@ def test_a_picture_is_traced_to_strokes_with_marks():
     ImageDraw.Draw(image).line([20, 80, 180, 80], fill=(220, 0, 0), width=3)
     ImageDraw.Draw(image).ellipse([120, 10, 170, 60], outline="black", width=3)
     session = open_drawing(png(image), "../../etc/photo.png")
-    assert session["name"] == "etc_photo"
-    assert session["page"] == [0, 0, 200, 160]
+    assert (session["name"], session["page"]) == ("etc_photo", [0, 0, 200, 160])
     assert Image.open(io.BytesIO(b64decode(session["picture"]))).size == (200, 160)
     (line,) = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "line"]
     (cut,) = [np.reshape(s["points"], (-1, 2)) for s in session["strokes"] if s["mark"] == "cut"]

@@ -297,8 +297,7 @@ def test_a_picture_finer_than_needed_gives_the_same_directions():
 
 def test_a_picture_coarser_than_its_grid_is_read():
     instance = read(png(drawn(50)), 128, "a.png")
-    assert max(instance.mask.shape) == 128
-    assert instance.grid.parts == 1
+    assert (max(instance.mask.shape), instance.grid.parts) == (128, 1)
 
 
 OUTLINE = f'<circle cx="50" cy="50" r="40" {BLACK}/>'
