@@ -144,9 +144,16 @@ def pytest_terminal_summary(terminalreporter, config):
 
 @pytest.fixture(scope="module")
 def chromium():
-    """A headless Chromium; its logs are kept."""
+    """A headless Chromium; its logs are kept. Pages are whole: under load, its driver returns before they are."""
     from oracles import browser as browser_program
     from selenium import webdriver
+    from selenium.webdriver.support.ui import WebDriverWait
+
+    class Patient(webdriver.Chrome):
+        def get(self, url):
+            super().get(url)
+            state = "return document.readyState"
+            WebDriverWait(self, 200).until(lambda page: page.execute_script(state) == "complete")
 
     driver = shutil.which("chromedriver")
     options = webdriver.ChromeOptions()
@@ -154,7 +161,7 @@ def chromium():
     for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage"):
         options.add_argument(argument)
     options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    browser = webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=driver))
+    browser = Patient(options=options, service=webdriver.ChromeService(executable_path=driver))
     yield browser
     browser.quit()
 

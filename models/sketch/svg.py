@@ -90,6 +90,7 @@ _WEAK: Final = 0.48  # the same for lines that are surely no part of the object
 _STRONG: Final = 0.1  # of the length of lines: part that is stronger than what others are compared with
 _MOST: Final = 0.5  # the same for curvature lines, which may be finer than few bold ones
 _ASIDE: Final = 0.06  # of its chord: distance of a straight line from it, also of one drawn by hand
+_ROUNDING: Final = 1e-9  # of its length: distance from a straight line of points that are on it
 _CORNER: Final = 0.02  # of the sides of the box of other lines: distance from a corner of it
 _MOST_STOPS: Final = 100  # stops of a gradient that count
 _MOST_BODIES: Final = 1000  # larger areas with which an area is compared
@@ -315,7 +316,7 @@ def _leave_out_areas(
     areas = [
         number
         for number, shape in enumerate(shapes)
-        if len(shape.points) and not (shape.is_stroked or _is_ground(shape, page, paper))
+        if not (shape.is_stroked or _is_straight(shape) or _is_ground(shape, page, paper))
     ]
     if areas and all(_is_curvature_line(shape, matcher) for shape in kept if len(shape.points)):
         for number in _find_silhouettes(shapes, areas):
@@ -334,6 +335,15 @@ def _find_silhouettes(shapes: Sequence[PaintedShape], areas: Sequence[int]) -> l
         if not is_within.all(axis=1).any():
             outer.append(place)
     return [areas[place] for place in outer]
+
+
+def _is_straight(shape: PaintedShape) -> bool:
+    """Whether all points of a shape are on one straight line, so that its fill shows nothing."""
+    way = (shape.points - shape.points[:1, :1]).reshape(-1, 2)
+    if not len(way):
+        return True
+    x, y = way[vector_length(*way.T).argmax()]
+    return bool((np.abs(way @ (y, -x)) <= _ROUNDING * (x * x + y * y)).all())
 
 
 def _is_ground(shape: PaintedShape, page: DrawingPage | None, paper: Floats) -> bool:
