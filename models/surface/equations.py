@@ -26,9 +26,8 @@ _FALL_OF_FEW: Final = 1e-8  # where a handful of pixels follows a curved valley 
 _FEW: Final = 100  # unknowns
 _DAMPING: Final = 1e-2
 _LEAST: Final = 1e-9
-_RESIDUAL: Final = 0.05  # relative, of a large system that is not factored
-_SMALL: Final = 1000  # unknowns of a system that is solved exactly, because starts are compared there
-_NARROW: Final = 100  # columns of its mask, or the band of its matrix is too wide
+_RESIDUAL: Final = 0.05  # relative, of a system that is not solved as a band
+_NARROW: Final = 160  # columns of a mask whose systems are solved as bands; wider ones take much memory
 _STEPS: Final = 12  # of conjugate gradients, which take as long as a factorisation
 _MEETING: Final = 2  # rows or columns between two heights that meet in a square
 _PAIRS: Final = np.kron(SLOPES, SLOPES).T  # of two slopes, for each pair of corners
@@ -229,7 +228,7 @@ def descend(equations: Equations, z: Floats, is_over: IsOver) -> tuple[float, Fl
     """Minimise from heights z, until there is hardly any gain; return the energy reached and its heights."""
     energy, damping = equations.energy(z), _DAMPING
     solver = SimilarSystems(steps=_STEPS)
-    is_small = len(z) <= _SMALL and equations.stencils.grid.width <= _NARROW
+    is_narrow = equations.stencils.grid.width <= _NARROW
     least_fall = _FALL_OF_FEW if len(z) <= _FEW else _FALL
     for _ in range(_ROUNDS):
         if is_over():
@@ -237,7 +236,7 @@ def descend(equations: Equations, z: Floats, is_over: IsOver) -> tuple[float, Fl
         slope, curvature = equations.model(z)
         diagonal = curvature.diagonal()
         for _ in range(_TRIALS):
-            if is_small:
+            if is_narrow:
                 step = solve_banded(curvature, slope, damping * diagonal)
             else:
                 step = solver.solve(curvature + sparse.diags_array(damping * diagonal), slope, _RESIDUAL)
