@@ -144,7 +144,7 @@ def pytest_terminal_summary(terminalreporter, config):
 
 @pytest.fixture(scope="module")
 def chromium():
-    """A headless Chromium; its logs are kept. Pages are whole: under load, its driver returns before they are."""
+    """A headless Chromium that keeps logs, and waits for pages: under load, its driver alone does not."""
     from oracles import browser as browser_program
     from selenium import webdriver
     from selenium.webdriver.support.ui import WebDriverWait

@@ -102,7 +102,7 @@ class PhotographedSheet:
                 f"what surrounds the sheet in the photo was left out (corners at {corners}), but the sheet "
                 "was not straightened, because the picture cuts it off; take a picture of the whole sheet"
             )
-        return f"the sheet in the photo was straightened (corners at {corners}), and the rest of the photo left out"
+        return f"the sheet in the photo was straightened (corners at {corners}), and the rest left out"
 
     def find_pixels(self, shape: tuple[int, int], reduction: int) -> Bools:
         """Which pixels of a picture of this shape, reduced by a factor, lie on the sheet."""

@@ -73,3 +73,12 @@ for (const each of document.querySelectorAll('body *')) {
 return found.sort((a, b) => a[0] - b[0]);
 """
 """Contrast of every text that is seen, with the text, the weakest first."""
+
+
+def check_legibility(browser: Any, width: int) -> None:
+    """Assert that the page fits the width of its window and that each text stands out from its ground."""
+    (window, wide), beyond = sideways(browser)
+    assert (wide <= window == width, beyond) == (True, [])
+    contrasts = browser.execute_script(CONTRAST)
+    assert contrasts
+    assert [each for each in contrasts if each[0] < 4.5 and "disabled" not in each[1]] == []

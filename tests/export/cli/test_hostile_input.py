@@ -153,10 +153,9 @@ def read_by_child(*paths):
 @pytest.mark.slow
 def test_costly_drawings_are_read_or_refused_in_little_time(tmp_path):
     """Without the limits most of them take minutes."""
-    paths = []
-    for number, data in enumerate(COSTLY_SVG.values()):
-        paths.append(tmp_path / f"{number}.svg")
-        paths[-1].write_bytes(data)
+    paths = [tmp_path / f"{number}.svg" for number in range(len(COSTLY_SVG))]
+    for path, data in zip(paths, COSTLY_SVG.values(), strict=True):
+        path.write_bytes(data)
     messages = [message for message, _ in read_by_child(*paths).values()]
     refused = {name: message for name, message in zip(COSTLY_SVG, messages, strict=True) if message}
     assert set(refused) == {

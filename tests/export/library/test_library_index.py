@@ -6,7 +6,7 @@ from dataclasses import replace
 from urllib.parse import unquote
 
 import pytest
-from browsing import CONTRAST, find, served, show, sideways
+from browsing import check_legibility, find, served, show
 from libraries import build, library_of, spec_of
 
 RAND = """[[sketches]]
@@ -160,7 +160,4 @@ def test_it_fits_the_window_and_can_be_read_in_both_modes(browser, address, widt
     for scheme in ("light", "dark"):
         show(browser, width=width, height=844, scheme=scheme)
         browser.get(address)
-        (window, page), wide = sideways(browser)
-        assert page <= window == width
-        assert wide == []
-        assert browser.execute_script(CONTRAST)[0][0] >= 4.5
+        check_legibility(browser, width)
