@@ -11,7 +11,9 @@ from ..field.field import CrossField
 from ..instance.domain import Floats
 from ..instance.instance import Instance
 from ..previews import Pictured
+from .equations import normals_of
 from .freedom import Freedom
+from .stencils import SLOPES, corners_of_blocks
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,24 +57,18 @@ class Surface(Pictured):
     @cached_property
     def corners(self) -> Floats:
         """Heights at the corners of each pixel, shape (n, 4): upper left and right, lower left and right."""
-        row, column = self.instance.grid.rows, self.instance.grid.columns
-        return np.stack(
-            [self.heights[row + down, column + right] for down in (0, 1) for right in (0, 1)], axis=1
-        )
+        corners = corners_of_blocks(self.heights)
+        return np.stack([corner[self.instance.mask] for corner in corners], axis=1)
 
     @cached_property
     def gradient(self) -> Floats:
         """Slopes (dz/dx, dz/dy) at the pixels' centres, y up, shape (n, 2)."""
-        upper_left, upper_right, lower_left, lower_right = self.corners.T
-        across = (upper_right - upper_left + lower_right - lower_left) / 2
-        upward = (upper_left - lower_left + upper_right - lower_right) / 2
-        return np.stack([across, upward], axis=1)
+        return np.asarray(self.corners @ SLOPES.T)
 
     @cached_property
     def normals(self) -> Floats:
         """Unit normals towards the viewer at the pixels' centres, shape (n, 3)."""
-        normal = np.column_stack([-self.gradient, np.ones(len(self.gradient))])
-        return np.asarray(normal / np.linalg.norm(normal, axis=1, keepdims=True))
+        return normals_of(self.gradient.T).T
 
     def flipped(self) -> Surface:
         """The same surface turned inside out, z to -z: the crosses are the same."""
