@@ -25,6 +25,7 @@ _SIDE: Final = 640  # pixels, about, of the longer side of the grid in a shaded 
 _MOST_SIDE: Final = 8000  # pixels of a page with a small drawing, of which the page gets a part
 _RIM: Final = 2  # pixels of the grid round it that the picture shows: strokes may be wide
 _FINE: Final = 32767  # steps of a part of a normal: 8 bits would show as bands
+_FEW: Final = 2  # curvature lines whose crosses say nothing of the depth: the next one can bend
 _SPACING: Final = 44  # streamlines of one family across the longer side of the grid
 
 
@@ -108,6 +109,7 @@ def surface_step(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
     strokes = len(document.strokes)
     misfit = np.bincount(stroke, off[instance.stroke_index[at]], strokes)
     misfit = misfit / np.maximum(np.bincount(stroke, minlength=strokes), 1)
+    is_begun = sum(document.strokes[number].mark == "line" for number in document.visible) <= _FEW
     return {
         "stage": "surface",
         "size": max(instance.mask.shape),
@@ -116,7 +118,7 @@ def surface_step(drawn: DrawnInstance, field: CrossField) -> dict[str, Any]:
         "height": view.height,
         "normals": encode_array(np.round(_FINE * normals), "i2"),
         "opacity": encode_array(np.round(255 * opacity), "u1"),
-        "freedom": [choice.document() for choice in lifted.freedom],
+        "freedom": [choice.document() for choice in lifted.freedom if not (choice.hint and is_begun)],
         "suspects": find_suspects(document, misfit),
     }
 

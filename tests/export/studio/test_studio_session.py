@@ -178,9 +178,11 @@ def test_a_bowl_is_the_surface_inside_out_and_beyond_the_mask_it_has_no_effect()
     assert np.nanmax(np.abs(bowl)) > 0.1
 
 
-def suspects(strokes):
+def doubts(strokes):
+    """Suspects, and whether another depth is offered."""
     _, drawn, field = field_step(changed(strokes=strokes))
-    return surface_step(drawn, field)["suspects"]
+    seen = surface_step(drawn, field)
+    return seen["suspects"], any(choice["kind"] == "depth" for choice in seen["freedom"])
 
 
 def strokes_of(outline, *lines):
@@ -221,16 +223,17 @@ def wave_lines():
 
 @pytest.mark.slow
 @for_each("drawn_lines", [ellipsoid_lines, wave_lines])
-def test_no_curvature_line_is_suspected_while_one_after_another_is_drawn(drawn_lines):
+def test_nothing_is_asked_that_the_next_line_would_answer(drawn_lines):
     outline, lines = drawn_lines()
     for count in range(1, len(lines) + 1):
-        assert suspects([outline, *lines[:count]]) == []
-    assert suspects([outline, *lines, line(20, 75, 105, 25)]) == [1 + len(lines)]
+        suspects, is_depth_open = doubts([outline, *lines[:count]])
+        assert suspects == []
+        assert not is_depth_open or count > 2
+    assert doubts([outline, *lines, line(20, 75, 105, 25)])[0] == [1 + len(lines)]
 
 
 def test_a_stroke_that_crosses_lines_of_both_families_is_suspected():
-    assert suspects(CROSSED) == [7]
-    assert suspects(CROSSED[:7]) == []
+    assert [doubts(strokes)[0] for strokes in (CROSSED, CROSSED[:7])] == [[7], []]
 
 
 @for_each("begin", [0, -1])  # at the pole, and beyond it
@@ -238,7 +241,7 @@ def test_lines_that_meet_at_a_pole_are_not_suspected(begin):
     circle = np.exp(1j * np.linspace(0, 2 * np.pi, 49)).view(float).reshape(-1, 2)
     arms = [np.outer([begin, 1], circle[at]) for at in range(0, 24, 4)]
     outline, lines = strokes_of(circle, *arms, circle / 3, circle * 2 / 3)
-    assert suspects([outline, *lines]) == []
+    assert doubts([outline, *lines])[0] == []
 
 
 def test_solver_files_come_with_their_manifest_or_a_reason():

@@ -8,6 +8,7 @@ import crossfield as cf
 import numpy as np
 import pytest
 from crossfield.models.processes.deadline import never
+from crossfield.models.smooth.bend import surface_field
 from crossfield.models.surface.equations import Equations, descend
 from crossfield.models.surface.lift import CLEARLY, WEIGHTS
 from crossfield.models.surface.stencils import Crosses, GridLevel, Stencils
@@ -17,10 +18,6 @@ from places import ROOT
 from shapes import corners_of
 
 KNOWN = ROOT.parent / "shared" / "known_surfaces"
-
-
-def surface_field(instance):
-    return cf.bend_field(cf.polyvector_field(instance, hold=100))
 
 
 @functools.cache
