@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..instance.angles import arctangent, cosine, sine, transform_vectors, vector_length, wrap
 from ..instance.domain import Bools, Floats
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
-from .cover import LEAST_WEIGHT, Frame, cover_by_segments, fit_frame
+from .cover import LEAST_WEIGHT, Frame, box_around, cover_by_segments, fit_frame
 from .outline import largest_part
 from .read import DEFAULT_SIZE, check_size
 
@@ -239,21 +239,7 @@ def analytic(
     """
     check_choice("surface", name, SURFACES)
     check_size(size)
-    return analytic_instance(
-        SURFACES[name], name, size, gauge=gauge, stroke_weight=stroke_weight, skew_weight=skew_weight
-    )
-
-
-def analytic_instance(
-    surface: CurvaturePatch,
-    name: str,
-    size: int,
-    *,
-    gauge: Gauge = "strokes",
-    stroke_weight: float = STROKE_WEIGHT,
-    skew_weight: float = SKEW_WEIGHT,
-) -> AnalyticInstance:
-    """Instance of any patch, as `analytic`."""
+    surface = SURFACES[name]
     frame = _frame_patch(surface, size)
     s, t, mask = _find_parameters(surface, frame)
     tangents = surface.tangents(s, t)
@@ -283,16 +269,14 @@ def analytic_instance(
 
 def _normals_towards_viewer(first: Floats, second: Floats) -> Floats:
     """The unit normals (n, 3) of tangent planes, z above 0."""
-    (ax, ay, az), (bx, by, bz) = first.T, second.T
-    normal = _vectors(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+    normal = np.cross(first, second)
     x, y, z = normal.T
     return normal * (np.where(z < 0, -1.0, 1.0) / vector_length(vector_length(x, y), z))[:, None]
 
 
 def _frame_patch(surface: CurvaturePatch, size: int) -> Frame:
     s, t = np.meshgrid(np.linspace(*surface.s_range, 400), np.linspace(*surface.t_range, 400))
-    x, y, _ = np.moveaxis(surface.point(s, t), -1, 0)
-    return fit_frame((float(x.min()), float(-y.max()), float(x.max()), float(-y.min())), size, margin=False)
+    return fit_frame(box_around(surface.point(s, t)[..., :2] * (1, -1)), size, margin=False)
 
 
 def _find_parameters(surface: CurvaturePatch, frame: Frame) -> tuple[Floats, Floats, Bools]:
@@ -324,10 +308,8 @@ def _invert_projection(surface: CurvaturePatch, wanted: Floats) -> tuple[Floats,
         area = ax * by - ay * bx
         # Away from the patch the projection may fold; such pixels only have to stay finite.
         area = np.where(np.abs(area) < 1e-3, np.copysign(1e-3, area), area)
-        s, t = (
-            s + (by * error[:, 0] - bx * error[:, 1]) / area,
-            t + (ax * error[:, 1] - ay * error[:, 0]) / area,
-        )
+        s = s + (by * error[:, 0] - bx * error[:, 1]) / area
+        t = t + (ax * error[:, 1] - ay * error[:, 0]) / area
         s, t = (
             np.clip(value, ends[0] - 0.5, ends[1] + 0.5)
             for value, ends in ((s, surface.s_range), (t, surface.t_range))
@@ -361,10 +343,8 @@ def _lines_at_spacing(surface: CurvaturePatch, frame: Frame, spacing: float) -> 
         float(vector_length(*np.diff(surface.point(*line)[:, :2], axis=0).T).sum()) / frame.pixel
         for line in middle_lines
     )
-    at_t, at_s = (
-        _spread_evenly(surface.t_range, high / spacing),
-        _spread_evenly(surface.s_range, wide / spacing),
-    )
+    at_t = _spread_evenly(surface.t_range, high / spacing)
+    at_s = _spread_evenly(surface.s_range, wide / spacing)
     u = _polyline_segments(surface, *np.broadcast_arrays(along_s[None], at_t[:, None]))
     v = _polyline_segments(surface, *np.broadcast_arrays(at_s[:, None], along_t[None]))
     return u, v
