@@ -11,7 +11,6 @@ from typing import Final
 import numpy as np
 
 from ..errors import InputError, NoStrokeError
-from ..instance.domain import Bools, Floats, Ints
 from ..instance.instance import SKEW_WEIGHT, STROKE_WEIGHT, Gauge, Instance
 from ..memory import check_memory
 from .cover import LEAST_WEIGHT
@@ -77,7 +76,9 @@ def random_instance(
         if not mask.any():
             raise NoStrokeError("the random mask has no pixel; choose a larger mask_share or another seed")
     count = max(1, round(share * int(mask.sum())))
-    pixels, theta, w = _draw_pixels(rng, mask, count)
+    inside = np.argwhere(mask).astype(np.int32)
+    pixels = inside[np.sort(rng.permutation(len(inside))[:count])]
+    theta, w = rng.uniform(0.0, np.pi, count), rng.uniform(LEAST_WEIGHT, 1.0, count)
     return Instance.on_pixels(
         name=name or f"rand_n{size:03}_s{seed}",
         mask=mask,
@@ -104,11 +105,3 @@ def _describe_source(seed: int, share: float, mask_share: float) -> str:
     values = (("share", float(share), STROKE_SHARE), ("mask_share", float(mask_share), usual))
     changed = [f"{name} {value}" for name, value, default in values if value != default]
     return ", ".join([f"random strokes on a {shape} mask, seed {seed}", *changed])
-
-
-def _draw_pixels(rng: np.random.Generator, mask: Bools, count: int) -> tuple[Ints, Floats, Floats]:
-    """Pixels (s, 2), theta (s,) and w (s,) of strokes of one pixel each."""
-    inside = np.argwhere(mask)
-    chosen = np.sort(rng.permutation(len(inside))[:count])
-    theta = rng.uniform(0.0, np.pi, count)
-    return inside[chosen].astype(np.int32), theta, rng.uniform(LEAST_WEIGHT, 1.0, count)
