@@ -8,7 +8,7 @@ import numpy as np
 
 from ..instance.domain import Bools
 from .cover import Frame
-from .outline import THICK
+from .outline import THICK, largest_part
 
 _BLOCK: Final = 4  # side in pixels of a block filled by strokes; no sample has one from 16 pixels on
 CROWDED: Final = 0.1  # least share of the solved pixels in blocks filled by strokes that causes a warning
@@ -28,14 +28,12 @@ def describe_loose_strokes(walls: Bools, region: Bools, frame: Frame) -> str | N
 
     eight = np.ones((3, 3), dtype=bool)
     bounding = ndimage.binary_dilation(region & ~walls, eight, iterations=THICK)
-    label, count = ndimage.label(walls & ~bounding & ~ndimage.binary_opening(walls, eight), eight)
-    size = np.bincount(label.ravel(), minlength=count + 1)
-    size[0] = 0
-    if region.all() or size.sum() < LOOSE * walls.sum():
+    loose = walls & ~bounding & ~ndimage.binary_opening(walls, eight)
+    if region.all() or loose.sum() < LOOSE * walls.sum():
         return None
     return (
-        f"{size.sum()} of {walls.sum()} stroke pixels bound no area, most of them round "
-        f"{_describe_middle(label == np.argmax(size), frame)}: what they should enclose is left out; "
+        f"{loose.sum()} of {walls.sum()} stroke pixels bound no area, most of them round "
+        f"{_describe_middle(largest_part(loose, eight), frame)}: what they should enclose is left out; "
         "close the outline there or give a mask"
     )
 
@@ -44,14 +42,13 @@ def describe_crowding(filled: Bools, mask: Bools, frame: Frame) -> str | None:
     """The largest place filled by strokes, which leave no room between them."""
     from scipy import ndimage
 
-    label, count = ndimage.label(ndimage.binary_opening(filled & mask, np.ones((_BLOCK, _BLOCK))))
-    size = np.bincount(label.ravel(), minlength=count + 1)
-    size[0] = 0
-    if size.max() < max(CROWDED * mask.sum(), 1):
+    crowded = ndimage.binary_opening(filled & mask, np.ones((_BLOCK, _BLOCK)))
+    most = largest_part(crowded)
+    if most.sum() < max(CROWDED * mask.sum(), 1):
         return None
     return (
-        f"strokes leave no room between them round {_describe_middle(label == np.argmax(size), frame)}, "
-        f"all in all on {size.sum() / mask.sum():.0%} of the pixels to solve for, where they give no "
+        f"strokes leave no room between them round {_describe_middle(most, frame)}, "
+        f"all in all on {crowded.sum() / mask.sum():.0%} of the pixels to solve for, where they give no "
         "direction; choose a larger size, or draw fewer lines and no solid ink there"
     )
 

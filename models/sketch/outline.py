@@ -160,9 +160,12 @@ def _find_slits(inside: Bools, free: Bools, walls: Bools) -> Bools:
     return np.asarray(slit[label])
 
 
-def largest_part(mask: Bools) -> Bools:
-    """The 4-connected part of a mask with most pixels, the first of equal ones."""
+def largest_part(mask: Bools, neighbours: Bools | None = None) -> Bools:
+    """The connected part of a mask with most pixels, the first of equal ones.
+
+    neighbours: [3, 3], which pixels touch the middle one; without it those at its four sides.
+    """
     from scipy import ndimage
 
-    label, _ = ndimage.label(mask)
+    label, _ = ndimage.label(mask, neighbours)
     return np.asarray(label == 1 + np.argmax(np.bincount(label.ravel(), minlength=2)[1:]))
