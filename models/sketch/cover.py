@@ -123,11 +123,9 @@ def fit_frame(box: Box, size: int, *, margin: bool) -> Frame:
     longer = max(right - left, bottom - top)
     if longer <= 0:
         raise InputError("draws no stroke: everything is one point")
-    border = MARGIN if margin else 0.0
-    pixel = longer * (1 + 2 * border) / size
-    if margin and size > 4:
-        pixel = max(pixel, longer / (size - 2))
-    border = max(border * longer, pixel if margin and size > 4 else 0.0)
+    share, least = (MARGIN if margin else 0.0), (1 if margin and size > 4 else 0)
+    pixel = max(longer * (1 + 2 * share) / size, longer / (size - 2 * least))
+    border = max(share * longer, least * pixel)
     width, height = (
         min(size, max(1, int(np.ceil((side + 2 * border) / pixel - 1e-6))))
         for side in (right - left, bottom - top)
