@@ -40,9 +40,8 @@ def read_scap(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
     """
     lines = _split_lines(data)
     page = _parse_page(lines[0] if lines else "")
-    strokes: list[list[tuple[float, float]]] = []
-    clusters: list[str] = []
-    samples: list[tuple[float, float]] = []
+    strokes: list[tuple[str, Floats]] = []
+    samples: list[list[float]] = []
     opened = 0
     for number, line in enumerate(map(str.strip, lines[1:]), start=2):
         if line == "{":
@@ -56,19 +55,18 @@ def read_scap(data: bytes, matcher: LabelMatcher | None = None) -> Curves:
                 raise InputError(f"line {number}: a stroke ends that did not start; remove the line")
             fields = lines[opened].strip().removeprefix("#").split()
             named = len(fields) == 2 and lines[opened].strip().startswith("#")
-            clusters.append(fields[1] if named else f"stroke {len(strokes)}")
-            strokes.append(samples)
+            if len(samples) > 1:
+                strokes.append((fields[1] if named else f"stroke {len(strokes)}", np.array(samples)))
             opened = 0
         elif line and line[0] not in "#@":
             if not opened:
                 raise InputError(
                     f"line {number}: a sample stands outside of strokes; put it between {{ and }}"
                 )
-            x, y = _parse_numbers(line, number, "x y pressure", 2)
-            samples.append((x, y))
+            samples.append(_parse_numbers(line, number, "x y pressure", 2))
     if opened:
         raise InputError(f"line {opened}: this stroke does not end; the file is cut off")
-    return _curves_of_clusters(strokes, clusters, page, matcher)
+    return _curves_of_clusters(strokes, page, matcher)
 
 
 def read_curves(data: bytes, view: str | None = None) -> Curves:
@@ -182,24 +180,18 @@ def _curves_of_polylines(strokes: list[Floats], curve: Ints, page: Box, taken: B
     return Curves(points, np.repeat(curve, count), np.zeros(len(points), dtype=bool), page, chosen)
 
 
-def _curves_of_clusters(
-    strokes: list[list[tuple[float, float]]],
-    clusters: list[str],
-    page: Box,
-    matcher: LabelMatcher | None,
-) -> Curves:
-    drawn = [number for number, stroke in enumerate(strokes) if len(stroke) > 1]
-    if not drawn:
+def _curves_of_clusters(strokes: list[tuple[str, Floats]], page: Box, matcher: LabelMatcher | None) -> Curves:
+    """The curves of pen strokes (n, 2) of two or more samples, each with the name of its cluster."""
+    if not strokes:
         raise InputError("holds no stroke of two or more samples")
-    names = [clusters[number] for number in drawn]
+    names, samples = zip(*strokes, strict=True)
     numbers = {name: number for number, name in enumerate(dict.fromkeys(names))}
     curve = [numbers[name] for name in names] if len(numbers) > 1 else range(len(names))
     taken = None
     if matcher is not None:
         taken = np.array([matcher.matches([f"cluster={name}"] if " " not in name else []) for name in names])
         matcher.check(any_stroke=bool(taken.any()))
-    samples = [np.array(strokes[number]) for number in drawn]
-    return _curves_of_polylines(samples, np.array(curve, dtype=np.int32), page, taken)
+    return _curves_of_polylines(list(samples), np.array(curve, dtype=np.int32), page, taken)
 
 
 def _parse_page(line: str) -> Box:
