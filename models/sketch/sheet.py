@@ -245,11 +245,8 @@ class _Quad:
 
     def colours_beyond(self, offsets: Floats) -> tuple[Floats, Bools]:
         """Colours (4, samples, offsets, channels) outward from the sides, and which are on the picture."""
-        x, y = np.moveaxis(
-            np.floor(self.places[:, :, None] + offsets[:, None] * self.outward[:, None, None]).astype(int),
-            -1,
-            0,
-        )
+        at = self.places[:, :, None] + offsets[:, None] * self.outward[:, None, None]
+        x, y = np.moveaxis(np.floor(at).astype(int), -1, 0)
         height, width = self.colours.shape[:2]
         on = (x >= 0) & (y >= 0) & (x < width) & (y < height)
         return self.colours[np.clip(y, 0, height - 1), np.clip(x, 0, width - 1)], on
@@ -269,9 +266,8 @@ class _Quad:
         for _ in range(12):
             weight = best / (np.abs(offset - ends @ basis.T) + 0.3)
             normal = np.einsum("ks,si,sj->kij", weight, basis, basis) + 1e-9 * np.eye(2)
-            ends = np.linalg.solve(normal, np.einsum("ks,si,ks->ki", weight, basis, offset)[..., None])[
-                ..., 0
-            ]
+            moment = np.einsum("ks,si,ks->ki", weight, basis, offset)
+            ends = np.linalg.solve(normal, moment[..., None])[..., 0]
         ends[self.is_cut] = 0
         return _Quad(self.colours, self.offset_sides(ends))
 
