@@ -67,25 +67,16 @@ def _find_usual_colours(pixels: NDArray[np.uint8]) -> Ink:
 
 def _weigh_strokes(pixels: NDArray[np.uint8], paper: Ink) -> tuple[float, float]:
     """How much is darker, and how much is lighter, than the paper round it."""
-    small = (
-        reduce_pixels(pixels, -(-max(pixels.shape) // _WEIGHED_SIDE)).mean(axis=-1, dtype=np.float32) / 255
-    )
+    from PIL import Image
+
+    image = Image.fromarray(pixels if pixels.shape[-1] == 3 else pixels[..., 0])
+    reduced = np.atleast_3d(np.asarray(image.reduce(-(-max(pixels.shape) // _WEIGHED_SIDE))))
+    small = reduced.mean(axis=-1, dtype=np.float32) / 255
     bright = paper.mean(axis=-1) / 255
     usual = _enlarge(bright, small.shape)
     lighter = (small - usual)[np.abs(usual - np.median(bright)) < _SOLID]
     clear = max(_CLEAR, _GRAIN * float(np.median(np.abs(lighter))))
     return float(np.maximum(-lighter - clear, 0).sum()), float(np.maximum(lighter - clear, 0).sum())
-
-
-def reduce_pixels(pixels: NDArray[np.uint8], factor: int) -> NDArray[np.uint8]:
-    """The means [h, w, channels] over blocks of that many rows and columns."""
-    from PIL import Image
-
-    if factor == 1:
-        return pixels
-    channels = pixels.shape[-1]
-    small = Image.fromarray(pixels if channels == 3 else pixels[..., 0]).reduce(factor)
-    return np.asarray(small).reshape(small.height, small.width, channels)
 
 
 def _darken_lighter_strokes(pixels: NDArray[np.uint8], paper: Ink) -> Floats:
