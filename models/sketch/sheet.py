@@ -74,8 +74,9 @@ class PhotographedSheet:
         """
         if self.size is not None:
             return self.straighten(pixels, reduction)
-        on_sheet = self.find_pixels((pixels.shape[0], pixels.shape[1]), reduction)[..., None]
-        return np.where(on_sheet, pixels, np.median(pixels[on_sheet[..., 0]], axis=0).astype(np.uint8))
+        on_sheet = _find_pixels_within(self.corners, pixels.shape, reduction)
+        paper = np.median(pixels[on_sheet], axis=0).astype(np.uint8)
+        return np.where(on_sheet[..., None], pixels, paper)
 
     def straighten(self, pixels: NDArray[np.uint8], reduction: int) -> NDArray[np.uint8]:
         """The sheet seen from above. Pixels and result, uint8 [h, w, channels], are reduced by a factor."""
@@ -104,13 +105,14 @@ class PhotographedSheet:
             )
         return f"the sheet in the photo was straightened (corners at {corners}), and the rest left out"
 
-    def find_pixels(self, shape: tuple[int, int], reduction: int) -> Bools:
-        """Which pixels of a picture of this shape, reduced by a factor, lie on the sheet."""
-        y, x = ((np.arange(side) + 0.5) * reduction for side in shape)
-        on = np.ones(shape, dtype=bool)
-        for (left, top), (right, bottom) in zip(self.corners, np.roll(self.corners, -1, axis=0), strict=True):
-            on &= (right - left) * (y[:, None] - top) >= (bottom - top) * (x - left)
-        return on
+
+def _find_pixels_within(corners: Floats, shape: tuple[int, ...], reduction: int) -> Bools:
+    """Which pixels [h, w] of a picture of this shape, reduced by a factor, lie within corners (4, 2)."""
+    y, x = ((np.arange(side) + 0.5) * reduction for side in shape[:2])
+    within = np.ones(shape[:2], dtype=bool)
+    for (left, top), (right, bottom) in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+        within &= (right - left) * (y[:, None] - top) >= (bottom - top) * (x - left)
+    return within
 
 
 def find_sheet(coarse: NDArray[np.uint8], factor: int, picture: tuple[int, int]) -> PhotographedSheet | None:
@@ -150,10 +152,8 @@ def find_sheet(coarse: NDArray[np.uint8], factor: int, picture: tuple[int, int])
 
 def _is_one_of_several(quad: _Quad) -> bool:
     """Whether a quadrilateral lies on even ground, unlike in photos, and much of the ink outside of it."""
-    height, width = quad.colours.shape[:2]
-    size = width, height
     inside, near = (
-        PhotographedSheet(quad.offset_sides(np.full((4, 2), reach)), size, None).find_pixels(size[::-1], 1)
+        _find_pixels_within(quad.offset_sides(np.full((4, 2), reach)), quad.colours.shape, 1)
         for reach in (2.0 * _WIDE, 4.0 * _WIDE)
     )
     beside = quad.colours[near & ~inside]
