@@ -171,17 +171,15 @@ class Pieces:
 
     def cover(self) -> Cover:
         """The cover by these pieces."""
-        shape, unit = self.frame.shape, self.unit
-        double = np.stack(
-            [np.ones(len(unit)), unit[:, 0] ** 2 - unit[:, 1] ** 2, -2 * unit[:, 0] * unit[:, 1]]
-        )
-        amount, cosine, sine = np.zeros((3, *shape))
+        x, y = self.unit.T
+        values = self.covered / 4 * np.stack([np.ones(len(x)), x**2 - y**2, -2 * x * y])
+        size = self.frame.height * self.frame.width
+        sums = np.zeros((3, size))
         for nudge in product((-_NUDGE, _NUDGE), repeat=2):
             cell, on_grid = _cells_of_points(self.middle + nudge, self.frame)
-            amount, cosine, sine = (
-                total + np.bincount(cell, value[on_grid], total.size).reshape(shape)
-                for total, value in zip((amount, cosine, sine), self.covered / 4 * double, strict=True)
-            )
+            for number, value in enumerate(values):
+                sums[number] += np.bincount(cell, value[on_grid], size)
+        amount, cosine, sine = sums.reshape(3, *self.frame.shape)
         direction = np.stack([cosine, sine], axis=-1) / np.where(amount > 0, amount, 1)[..., None]
         return Cover(amount, direction)
 
