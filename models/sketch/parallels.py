@@ -65,10 +65,8 @@ def find_non_edges(curves: Curves) -> tuple[Bools, tuple[str, ...]]:
         offset = middle @ (-along[1], along[0])
         order = np.argsort(offset, kind="stable")
         # Lines of a row are side by side; pieces of one edge follow each other.
-        apart = np.abs(np.diff(middle[order] @ along))
-        is_row = (
-            np.median(apart / np.minimum(chord[members][order][1:], chord[members][order][:-1])) < _BESIDE
-        )
+        apart, length = np.abs(np.diff(middle[order] @ along)), chord[members][order]
+        is_row = np.median(apart / np.minimum(length[1:], length[:-1])) < _BESIDE
         if is_row and (is_ruled or np.median(np.diff(offset[order])) <= _CLOSE * side):
             is_left_out[members] = True
             if is_ruled:  # the margin of a page crosses all lines, in any colour
