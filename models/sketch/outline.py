@@ -124,7 +124,7 @@ def find_strokes_along_outline(region: Bools, direction: Floats, width: float) -
     return along
 
 
-def enclosed_region(strokes: Bools, gap: float = GAPS[0]) -> Bools:
+def enclosed_region(strokes: Bools, gap: float) -> Bools:
     """The region that a disc, of a share `gap` of the longer side, cannot reach without touching a stroke."""
     from scipy import ndimage
 
