@@ -34,7 +34,7 @@ from ..instance.angles import transform_vectors, vector_length
 from ..instance.domain import Bools, Floats, Ints
 from .cascade import UNSHOWN, Cascade, background_of, cascade_of
 from .colour import PAPER, is_red
-from .cover import Box
+from .cover import Box, box_around
 from .curves import Curves, flatten, lines_as_cubics, run_numbers
 from .labels import LabelMatcher, colour_label, labels_of
 from .meetings import GRID, find_meetings, resample
@@ -298,8 +298,8 @@ def _trace_strokes(
     strength = np.array([np.median(difference[tuple(way.T)]) ** 2 for way, _ in ways])
     red, points = np.array([is_line for _, is_line in ways], dtype=bool)[number], np.concatenate(cubics)
     chosen = red if has_choice else None
-    faint = _find_faint(points, [number], strength[number], red) & ~(has_choice & red)
-    return Curves(points, number, red, page.box if page else None, chosen, notes, faint)
+    curves = Curves(points, number, red, page.box if page else None, chosen, notes)
+    return _mark_faint(curves, [number], strength[number])
 
 
 def _leave_out_areas(
@@ -370,40 +370,29 @@ def _is_curvature_line(shape: PaintedShape, matcher: LabelMatcher | None) -> boo
 
 def _join_strokes(
     shapes: Sequence[PaintedShape],
-    seen: Sequence[Seen],
+    seen: Seen,
     page: DrawingPage | None,
     matcher: LabelMatcher | None,
     notes: tuple[str, ...],
 ) -> Curves:
     """The curves of what is seen of the shapes, with colours and choices. Raises InputError."""
-    if not sum(len(part.points) for part in seen):
+    if not len(seen.points):
         raise InputError(f"shows no stroke: {'; '.join(notes) or 'all have the colour of the paper'}")
-    red, taken = is_red(np.array([part.colour for part in seen])), None
+    chosen = None
     if matcher is not None:
-        taken = np.array(
-            [
-                (len(part.points) > 0 and matcher.matches([colour_label(part.colour)])) or shape.chosen
-                for shape, part in zip(shapes, seen, strict=True)
-            ]
-        )
-    points = np.concatenate([part.points for part in seen])
-    number = np.repeat(np.arange(len(seen), dtype=np.int32), [len(part.points) for part in seen])
-    run, red, chosen = run_numbers(points, number), red[number], None
-    if matcher is not None and taken is not None:
-        chosen = taken[number]
+        taken = np.array([shape.chosen for shape in shapes])
+        for number in np.unique(seen.shape):
+            taken[number] |= matcher.matches([colour_label(seen.colour[number].tolist())])
+        chosen = taken[seen.shape]
         matcher.check(any_stroke=bool(chosen.any()))
-    strength = np.array([part.strength for part in seen])[number]
-    is_line = red if chosen is None else chosen
+    red, run = is_red(seen.colour)[seen.shape], run_numbers(seen.points, seen.shape)
+    curves = Curves(seen.points, run, red, page.box if page else None, chosen, notes)
     # An element has several lines, or dashes of one.
-    line = np.concatenate([part.line for part in seen])
-    faint = _find_faint(points, [line, number], strength, is_line)
-    if chosen is not None:
-        faint &= ~chosen
-    return Curves(points, run, red, page.box if page else None, chosen, notes, faint)
+    return _mark_faint(curves, [seen.line, seen.shape], seen.strength[seen.shape])
 
 
-def _find_faint(points: Floats, lines: Sequence[Ints], strength: Floats, is_line: Bools) -> Bools:
-    """Which cubics (k,) are of lines much paler or thinner than others.
+def _mark_faint(curves: Curves, lines: Sequence[Ints], strength: Floats) -> Curves:
+    """The curves with those marked as faint that are much paler or thinner than others, and not chosen.
 
     Weak ones, which may be a third as wide, have to be surely no part of the object: curvature lines go on
     across them, or, where all are curvature lines, they are straight, and begin and end outside of the others
@@ -411,7 +400,7 @@ def _find_faint(points: Floats, lines: Sequence[Ints], strength: Floats, is_line
 
     lines: number of the line of each cubic, ascending; several if what is a line is open.
     """
-    is_line = is_line | (not is_line.any())
+    points, is_line = curves.points, curves.line
     length = vector_length(*np.moveaxis(np.diff(points, axis=1), -1, 0)).sum(axis=1)
 
     def is_below(kind: Bools, ratio: float, part: float) -> Bools:
@@ -423,11 +412,12 @@ def _find_faint(points: Floats, lines: Sequence[Ints], strength: Floats, is_line
     if not is_line.all():
         cuts = ~is_line & weak
         faint = (is_line & is_below(is_line, _FAINT, _STRONG)) | (cuts & is_below(~is_line, _FAINT, _STRONG))
-        return faint | _are_crossed(points, lines[0], cuts, is_line)
-    weak |= is_below(is_line, _FAINT, _STRONG)
-    corners = points[~weak].reshape(-1, 2)
-    box = corners.min(axis=0), corners.max(axis=0)
-    return np.asarray(weak & np.any([_leave_box(points, number, *box) for number in lines], axis=0))
+        faint |= _are_crossed(points, lines[0], cuts, is_line)
+    else:
+        weak |= is_below(is_line, _FAINT, _STRONG)
+        low, high = np.reshape(box_around(points[~weak]), (2, 2))
+        faint = weak & np.any([_leave_box(points, number, low, high) for number in lines], axis=0)
+    return replace(curves, faint=faint if curves.chosen is None else faint & ~curves.chosen)
 
 
 def _leave_box(points: Floats, number: Ints, low: Floats, high: Floats) -> Bools:

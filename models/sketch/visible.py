@@ -64,17 +64,19 @@ class PaintedShape:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """The visible part of a shape.
+    """The visible parts of n shapes.
 
-    points: (m, 4, 2), control points. line: (m,), number of the unbroken line, among all shapes, of which
-    each is a part. colour: red, green, blue in [0, 1]. strength: of its lines, the square of their difference
-    from the ground, in [0, 1], times their width; not a number for an area.
+    points: (m, 4, 2), control points, in the order of the shapes. shape, line: (m,), number of the shape, and
+    of the unbroken line among all shapes, of which each is a part. colour: (n, 3), red, green, blue in
+    [0, 1]. strength: (n,), of the lines of a shape, the square of their difference from the ground, in
+    [0, 1], times their width; not a number for an area.
     """
 
     points: Floats
+    shape: Indices
     line: Ints
-    colour: tuple[float, float, float]
-    strength: float
+    colour: Floats
+    strength: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +85,8 @@ class _LineSamples:
 
     shape, cubic, run: (s,), numbers of the shape, of its cubic among all, and of the unbroken run. start,
     end: (s,), parameters on the cubic between which a sample stands. place: (s, 2), in units of the page.
-    pixel: (s,), number of the picture's pixel; -1 off the page. length: (s,), in pixels.
+    pixels: (3, s), number of the picture's pixel there and to both sides; -1 off the page. length: (s,), in
+    pixels.
     """
 
     shape: Indices
@@ -98,8 +101,8 @@ class _LineSamples:
 
 def see_strokes(
     root: Element, window: Box, shapes: Sequence[PaintedShape], paper: str, *, is_line: Bools
-) -> tuple[list[Seen], tuple[str, ...]]:
-    """The visible part of each shape, and notes on the strokes that are left out. Raises InputError.
+) -> tuple[Seen, tuple[str, ...]]:
+    """The visible parts of shapes, and notes on the strokes that are left out. Raises InputError.
 
     root: the drawing, framed by the window: x, y, width and height. Its shapes get other styles. paper: the
     colour behind it, as #rrggbb. is_line: which shapes are curvature lines.
@@ -114,7 +117,8 @@ def see_strokes(
         for shape, style in zip(shapes, styles, strict=True):
             _restyle(shape, style + ";stroke:none" + ("" if shape.is_ground else ";fill:none"))
         ground = picture_of(root, paper)
-    expected = np.array([opaque_colour(shape.paint) for shape in shapes])[samples.shape]
+    paints = np.array([opaque_colour(shape.paint) for shape in shapes])
+    expected = paints[samples.shape]
 
     def look(pixel: Indices) -> tuple[Floats, Floats, Bools, Bools]:
         """Colours at pixels, how far they are from the ground, where they differ, and where they fit."""
@@ -138,7 +142,7 @@ def see_strokes(
         # A stroke in the colour of its ground is none, and needs no note.
         notes = _describe_hidden(samples, shapes, ~visible & (front != 2 * samples.shape))
     colour[~_shows_colour(samples, visible & contrast, front, own)] = np.nan
-    return _collect(samples, shapes, visible, np.column_stack([colour, difference]), expected), notes
+    return _collect(samples, shapes, visible, np.column_stack([colour, difference]), paints), notes
 
 
 def _shows_colour(samples: _LineSamples, visible: Bools, front: Indices, own: Bools) -> Bools:
@@ -234,10 +238,9 @@ def _sample_lines(shapes: Sequence[PaintedShape], window: Box, pixel: float) -> 
     pixels = []
     for spot in (place, place + aside, place - aside):
         # A line on the edge of the page shows half of its width.
-        near = (spot >= -0.5) & (spot <= (wide + 0.5, high + 0.5))
-        column, row = np.floor(np.where(near, spot.clip(0, (wide - 0.5, high - 0.5)), spot)).astype(np.intp).T
-        inside = (column >= 0) & (column < wide) & (row >= 0) & (row < high)
-        pixels.append(np.where(inside, row * wide + column, -1))
+        is_shown = ((spot >= -0.5) & (spot <= (wide + 0.5, high + 0.5))).all(axis=1)
+        column, row = spot.clip(0, (wide - 0.5, high - 0.5)).astype(np.intp).T
+        pixels.append(np.where(is_shown, row * wide + column, -1))
     return _LineSamples(
         number[cubic],
         cubic,
@@ -266,15 +269,10 @@ def _find_fronts(
     _make_opaque(root)
     picture = picture_of(root).reshape(-1, 3)
     known = {_flat_colour(number): number for number in range(2 * len(shapes))} | {0xFFFFFF: -1}
-    codes, inverse = np.unique(_codes(picture[samples.pixels.ravel()]), return_inverse=True)
+    codes = picture[samples.pixels] @ np.array([1 << 16, 1 << 8, 1])
+    codes, inverse = np.unique(codes, return_inverse=True)
     front = np.array([known.get(code, -2) for code in codes.tolist()])[inverse.reshape(samples.pixels.shape)]
     return np.where(samples.pixels < 0, -1, front)
-
-
-def _codes(colours: NDArray[np.uint8]) -> Indices:
-    """Colours (n, 3) as whole numbers (n,)."""
-    red, green, blue = colours.astype(np.intp).T
-    return np.asarray(red << 16 | green << 8 | blue)
 
 
 def _flat_colour(number: int) -> int:
@@ -338,31 +336,26 @@ def _describe_hidden(samples: _LineSamples, shapes: Sequence[PaintedShape], lost
 
 
 def _collect(
-    samples: _LineSamples, shapes: Sequence[PaintedShape], visible: Bools, colour: Floats, expected: Floats
-) -> list[Seen]:
-    """The visible parts of each shape, whole cubics unchanged.
+    samples: _LineSamples, shapes: Sequence[PaintedShape], visible: Bools, colour: Floats, paints: Floats
+) -> Seen:
+    """The visible parts of all shapes, whole cubics unchanged.
 
-    colour: (s, 4), red, green, blue, nan where another's, and their difference from the ground.
+    colour: (s, 4), red, green, blue, nan where another's, and their difference from the ground. paints: the
+    colours (n, 3) of the shapes' paints, which are theirs unless the picture shows others.
     """
     points = np.concatenate([shape.points for shape in shapes])
     before = np.r_[False, visible[:-1] & (np.diff(samples.cubic) == 0)]
     after = np.r_[before[1:] & visible[1:], False]
     starts, ends = np.flatnonzero(visible & ~before), np.flatnonzero(visible & ~after)
     parts = cut_cubics(points[samples.cubic[starts]], samples.start[starts], samples.end[ends])
-    bounds = np.searchsorted(samples.shape[starts], np.arange(len(shapes) + 1))
-    edges = np.searchsorted(samples.shape, np.arange(len(shapes) + 1))
-    seen = []
-    for number, shape in enumerate(shapes):
-        within = slice(edges[number], edges[number + 1])
-        shown = colour[within][np.isfinite(colour[within, 0])]
-        rgb, strength = np.full(3, np.nan), np.nan
-        if edges[number] < edges[number + 1]:
-            rgb = expected[edges[number]]
-        if len(shown):
-            *median, difference = np.median(shown, axis=0)
-            strength = difference**2 * shape.width if shape.is_stroked else np.nan
-            rgb = rgb if (np.abs(median - rgb) <= _SAME).all() else np.array(median)
-        red, green, blue = np.nan_to_num(rgb).tolist()
-        kept = slice(bounds[number], bounds[number + 1])
-        seen.append(Seen(parts[kept], samples.run[starts][kept], (red, green, blue), strength))
-    return seen
+    rgb, strength = paints.copy(), np.full(len(shapes), np.nan)
+    is_shown = np.isfinite(colour[:, 0])
+    shown, owner = colour[is_shown], samples.shape[is_shown]
+    edges = np.searchsorted(owner, np.arange(len(shapes) + 1))
+    for number in np.unique(owner):
+        *median, difference = np.median(shown[edges[number] : edges[number + 1]], axis=0)
+        if shapes[number].is_stroked:
+            strength[number] = difference**2 * shapes[number].width
+        if not (np.abs(median - rgb[number]) <= _SAME).all():
+            rgb[number] = median
+    return Seen(parts, samples.shape[starts], samples.run[starts], np.nan_to_num(rgb), strength)
