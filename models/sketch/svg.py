@@ -46,7 +46,6 @@ from .svg_elements import (
     SVG,
     chosen_attributes,
     length_of,
-    length_of_attribute,
     name_of,
     number_of,
     tag_of,
@@ -132,11 +131,10 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     page = page_of(root)
     cascade = cascade_of("".join(element.itertext()) for element in root.iter() if tag_of(element) == "style")
     styles = cascade.declare(root)
-    pictured = dict(styles)
     background = background_of(styles[root])
     walk = _ElementWalk(_put_styles(root, styles), matcher)
     painted = list(walk.shapes(root, page))
-    unread = _list_unread(pictured, cascade, walk)
+    unread = _list_unread(cascade, walk)
     shapes = _leave_out_areas(painted, page, matcher, background or "#ffffff")
     pens = _find_filled_strokes([shape for shape in painted if len(shape.points)])
     if not pens and not sum(len(shape.points) for shape in shapes):
@@ -188,8 +186,10 @@ def _flatten(
 
 def _find_filled_strokes(shapes: Sequence[PaintedShape]) -> set[Element]:
     """The elements that are only filled, and as long and thin as strokes; none if they are few."""
-    ends = [bound(shape.points.reshape(-1, 2), axis=0) for shape in shapes for bound in (np.min, np.max)]
-    widest = _WIDEST * float(np.ptp(ends, axis=0).max()) if shapes else 0.0
+    if not shapes:
+        return set()
+    left, top, right, bottom = box_around(np.concatenate([shape.points for shape in shapes]))
+    widest = _WIDEST * max(right - left, bottom - top)
     pens, painted, drawn = set(), 0.0, 0.0
     for shape in shapes:
         length = float(vector_length(*(shape.points[:, 3] - shape.points[:, 0]).T).sum())
@@ -326,8 +326,8 @@ def _leave_out_areas(
 
 def _find_silhouettes(shapes: Sequence[PaintedShape], areas: Sequence[int]) -> list[int]:
     """The numbers of the areas that are not in the box of a larger one: the outline of the drawing."""
-    corners = [shapes[number].points.reshape(-1, 2) for number in areas]
-    low, high = (np.array([bound(corner, axis=0) for corner in corners]) for bound in (np.min, np.max))
+    corners = np.reshape([box_around(shapes[number].points) for number in areas], (-1, 2, 2))
+    low, high = corners.swapaxes(0, 1)
     outer: list[int] = []
     for place in np.argsort(-np.prod(high - low, axis=1), kind="stable").tolist():
         around = outer[:_MOST_BODIES]
@@ -356,9 +356,9 @@ def _is_ground(shape: PaintedShape, page: DrawingPage | None, paper: Floats) -> 
 def _covers_page(shape: PaintedShape, page: DrawingPage | None) -> bool:
     if page is None or not len(shape.points):
         return False
-    corners, start = shape.points.reshape(-1, 2), np.array(page.window[:2])
+    (low, high), start = np.reshape(box_around(shape.points), (2, 2)), np.array(page.window[:2])
     end, room = start + page.window[2:], 1e-3 * max(page.window[2:])
-    return bool((corners.min(axis=0) <= start + room).all() and (corners.max(axis=0) >= end - room).all())
+    return bool((low <= start + room).all() and (high >= end - room).all())
 
 
 def _is_curvature_line(shape: PaintedShape, matcher: LabelMatcher | None) -> bool:
@@ -451,13 +451,11 @@ def _are_crossed(points: Floats, number: Ints, weak: Bools, is_line: Bools) -> B
     return np.isin(number, pairs[is_weak & ~is_weak[:, ::-1]]) & weak
 
 
-def _list_unread(
-    styles: Mapping[Element, Mapping[str, str]], cascade: Cascade, walk: _ElementWalk
-) -> tuple[str, ...]:
+def _list_unread(cascade: Cascade, walk: _ElementWalk) -> tuple[str, ...]:
     """Notes on the pictures, faults, colours and transforms of a drawing that were not read."""
     pictures = [
         name_of(element)
-        for element, style in styles.items()
+        for element, style in walk.styles.items()
         if tag_of(element) == "image" and style.get("display") != "none"
     ]
     colours, transforms = (
@@ -593,10 +591,9 @@ class _ElementWalk:
             raise InputError(f"draws more than {MAX_USES} <use> elements; expand them in the drawing program")
         element, style = place.element, self.styles[place.element]
         link = next((element.get(key, "") for key in HREFS if key in element.attrib), "")
-        moves = [
-            length_of_attribute(element, key, 0.0, side)
-            for key, side in zip(("x", "y"), place.size, strict=True)
-        ]
+        x, y = (
+            length_of(element.get(key, ""), 0.0, side) for key, side in zip("xy", place.size, strict=True)
+        )
         sides, kept = (chosen_attributes(element, keys) for keys in (("width", "height"), GROUP))
         element.clear()
         element.tag, element.attrib = SVG + "g", kept
@@ -610,7 +607,7 @@ class _ElementWalk:
         if tag_of(target) in ("symbol", "svg"):
             copy.tag = SVG + "svg"
             copy.attrib = {"width": "100%", "height": "100%"} | copy.attrib | sides
-        moved = SubElement(element, SVG + "g", {"transform": f"translate({moves[0]!r} {moves[1]!r})"})
+        moved = SubElement(element, SVG + "g", {"transform": f"translate({x!r} {y!r})"})
         self.styles[moved] = {}
         moved.append(copy)
         self.styles[element] = style
@@ -725,10 +722,10 @@ def _inner_view(place: _Place) -> _Place:
     from svgelements import Matrix
 
     element = place.element
-    x, y = (length_of_attribute(element, key, 0.0, side) for key, side in zip("xy", place.size, strict=True))
-    wide, high = (
-        length_of_attribute(element, key, side, side)
-        for key, side in zip(("width", "height"), place.size, strict=True)
+    keys, defaults = ("x", "y", "width", "height"), (0.0, 0.0, *place.size)
+    x, y, wide, high = (
+        length_of(element.get(key, ""), default, side)
+        for key, default, side in zip(keys, defaults, place.size * 2, strict=True)
     )
     view = view_box(element)
     if view is None:

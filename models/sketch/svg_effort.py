@@ -13,14 +13,13 @@ import numpy as np
 from ..errors import InputError
 from ..input_limits import MAX_DEPTH, MAX_ELEMENTS, MAX_LAYERS
 from ..instance.domain import Floats
-from .cover import Box
+from .cover import Box, box_around
 from .svg_elements import HREFS, tag_of
 from .visible import RENDERED_SIDE, PaintedShape
 
 _EASY: Final = 100  # layers of the size of the page that are drawn at full resolution
 _LEAST_SIDE: Final = 256  # pixels on the longer side of a picture
 _LAYERED: Final = ("clip-path", "mask", "opacity")
-_EMPTY: Final = np.array([[np.inf, np.inf], [-np.inf, -np.inf]])
 
 
 def choose_side(root: Element, window: Box, shapes: Sequence[PaintedShape]) -> int:
@@ -30,7 +29,7 @@ def choose_side(root: Element, window: Box, shapes: Sequence[PaintedShape]) -> i
     many elements or layers, or nest them too deep.
     """
     named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
-    boxes = {shape.element: _box_of(shape, window) for shape in shapes}
+    boxes = {shape.element: _corners_of(shape, window) for shape in shapes if len(shape.points)}
     efforts: dict[Element, tuple[int, int]] = {}
     layers = 0.0
     stack, around = [(root, False)], set[Element]()
@@ -47,10 +46,10 @@ def choose_side(root: Element, window: Box, shapes: Sequence[PaintedShape]) -> i
                     "another, by its clips, masks and patterns; flatten it in the drawing program"
                 )
             efforts[element] = count, depth
-            box = _join_boxes([boxes[part] for part in (element, *element) if part in boxes])
-            boxes[element] = box
-            if _is_layered(element):
-                layers += float(np.prod(np.maximum(box[1] - box[0], 0)))
+            if inside := [boxes[part] for part in (element, *element) if part in boxes]:
+                boxes[element] = np.reshape(box_around(np.array(inside)), (2, 2))
+            if _is_layered(element) and inside:
+                layers += float(np.prod(boxes[element][1] - boxes[element][0]))
                 if layers > MAX_LAYERS:
                     raise InputError(
                         f"has more than {MAX_LAYERS} clips, masks and opacities of the size of the page; "
@@ -62,21 +61,11 @@ def choose_side(root: Element, window: Box, shapes: Sequence[PaintedShape]) -> i
     return max(_LEAST_SIDE, round(RENDERED_SIDE * min(1.0, math.sqrt(_EASY / max(layers, 1.0)))))
 
 
-def _box_of(shape: PaintedShape, window: Box) -> Floats:
-    """Least and greatest corner of a shape as shares of the window, within it."""
-    if not len(shape.points):
-        return _EMPTY
-    corners = (shape.points.reshape(-1, 2) - window[:2]) / window[2:]
+def _corners_of(shape: PaintedShape, window: Box) -> Floats:
+    """Top left and bottom right corner (2, 2) of a shape as shares of the window, within it."""
+    corners = (np.reshape(box_around(shape.points), (2, 2)) - window[:2]) / window[2:]
     room = shape.width / max(window[2:])
-    return np.asarray(np.clip([corners.min(axis=0) - room, corners.max(axis=0) + room], 0, 1))
-
-
-def _join_boxes(boxes: Sequence[Floats]) -> Floats:
-    """The box around boxes of least and greatest corners."""
-    if not boxes:
-        return _EMPTY
-    joined = np.array(boxes)
-    return np.stack([joined[:, 0].min(axis=0), joined[:, 1].max(axis=0)])
+    return np.asarray(np.clip([corners[0] - room, corners[1] + room], 0, 1))
 
 
 def _is_layered(element: Element) -> bool:

@@ -15,13 +15,8 @@ GROUP: Final = ("id", "style", "transform")
 """Attributes of an element that its group keeps."""
 
 
-def length_of_attribute(element: Element, key: str, default: float, whole: float | None = None) -> float:
+def length_of(text: str, default: float, whole: float | None = None) -> float:
     """A length in CSS pixels, a percentage of `whole`; `default` when it is missing or unreadable."""
-    return length_of(element.get(key, ""), default, whole)
-
-
-def length_of(text: str, default: float, whole: float | None) -> float:
-    """A length in CSS pixels, a percentage of `whole`; `default` when it is unreadable."""
     if text.endswith("%") and whole is not None:
         return whole * number_of(text) / 100
     pixels = length_in_pixels(text)

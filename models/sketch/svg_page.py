@@ -12,8 +12,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..input_limits import LEAST_LENGTH
-from .cover import Box
-from .svg_elements import GROUP, SVG, chosen_attributes, length_of_attribute, name_of
+from .cover import Box, box_around
+from .svg_elements import GROUP, SVG, chosen_attributes, length_of, name_of
 from .visible import PaintedShape
 
 GREATEST: Final = 1e9
@@ -39,7 +39,7 @@ class DrawingPage:
 def page_of(root: Element) -> DrawingPage | None:
     """The page of a drawing; None if it states neither a viewBox nor a width and height."""
     view = view_box(root)
-    wide, high = (length_of_attribute(root, key, 0.0) for key in ("width", "height"))
+    wide, high = (length_of(root.get(key, ""), 0.0) for key in ("width", "height"))
     has_size = min(wide, high) >= LEAST_LENGTH
     if view is None:
         box = (0.0, 0.0, wide, high)
@@ -55,11 +55,9 @@ def page_of(root: Element) -> DrawingPage | None:
 
 def window_around(shapes: Sequence[PaintedShape]) -> Box:
     """The box of all shapes with a margin, for a drawing without a page."""
-    corners = np.concatenate([shape.points.reshape(-1, 2) for shape in shapes])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    margin = _OWN_MARGIN * max(float((high - low).max()), LEAST_LENGTH)
-    (left, top), (wide, tall) = (low - margin).tolist(), (high - low + 2 * margin).tolist()
-    return left, top, wide, tall
+    left, top, right, bottom = box_around(np.concatenate([shape.points for shape in shapes]))
+    margin = _OWN_MARGIN * max(right - left, bottom - top, LEAST_LENGTH)
+    return left - margin, top - margin, right - left + 2 * margin, bottom - top + 2 * margin
 
 
 def frame_drawing(root: Element, page: DrawingPage | None, window: Box, side: int) -> Element:
@@ -68,12 +66,9 @@ def frame_drawing(root: Element, page: DrawingPage | None, window: Box, side: in
     wide, high = (str(max(1, round(side * length / max(window[2:])))) for length in window[2:])
     shown = {"viewBox": _join(window), "preserveAspectRatio": "none", "width": wide, "height": high}
     frame = Element(SVG + "svg", shown)
-    sides = {key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), box, strict=True)}
-    inner = SubElement(
-        frame,
-        SVG + "svg",
-        {**sides, "viewBox": _join(view), "preserveAspectRatio": "none", "overflow": "visible"},
-    )
+    placed = {key: f"{value!r}" for key, value in zip(("x", "y", "width", "height"), box, strict=True)}
+    placed |= {"viewBox": _join(view), "preserveAspectRatio": "none", "overflow": "visible"}
+    inner = SubElement(frame, SVG + "svg", placed)
     SubElement(inner, SVG + "g", chosen_attributes(root, GROUP)).extend(list(root))
     return frame
 
@@ -93,17 +88,16 @@ def fit_view(view: Box, wide: float, high: float, rule: str) -> tuple[float, flo
 
 def view_box(element: Element) -> Box | None:
     """The viewBox of an element, None without one. Raises InputError for one without an area."""
-    fields = re.split(r"[\s,]+", element.get("viewBox", "").strip())
-    if fields == [""]:
+    text = element.get("viewBox", "")
+    if not text.strip():
         return None
+    start = f"{name_of(element)}: its viewBox {text[:40]!r}"
     try:
-        x, y, width, height = (float(field) for field in fields)
+        x, y, width, height = map(float, re.split(r"[\s,]+", text.strip()))
     except ValueError as error:
-        raise InputError(
-            f"{name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} is not four numbers"
-        ) from error
+        raise InputError(f"{start} is not four numbers") from error
     if not (np.abs([x, y, width, height]) <= GREATEST).all() or min(width, height) < LEAST_LENGTH:
-        raise InputError(f"{name_of(element)}: its viewBox {element.get('viewBox', '')[:40]!r} has no area")
+        raise InputError(f"{start} has no area")
     return x, y, width, height
 
 
