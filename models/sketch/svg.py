@@ -99,15 +99,15 @@ _MOST_BODIES: Final = 1000  # larger areas with which an area is compared
 class _Place:
     """An element to visit, and what it takes from those around it.
 
-    size: width and height to which percentages refer. links: ids of the copies around it. depth: number of
-    elements around it. chosen: whether it, or an element around it, has a chosen label.
+    size: width and height to which percentages refer. copied: what `use` elements around it show. depth:
+    number of elements around it. chosen: whether it, or an element around it, has a chosen label.
     """
 
     element: Element
     style: Mapping[str, str]
     matrix: Any
     size: tuple[float, float]
-    links: tuple[str, ...] = ()
+    copied: tuple[Element, ...] = ()
     depth: int = 0
     chosen: bool = False
 
@@ -147,14 +147,12 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     side = choose_side(root, window, painted)
     framed = frame_drawing(root, page, window, side)
     if max(walk.reach, *map(abs, window[:2])) > _FAR * max(window[2:]):
-        framed = frame_drawing(_flatten(painted, walk.inherited, window), None, (0.0, 0.0, *window[2:]), side)
+        framed = frame_drawing(_flatten(painted, window), None, (0.0, 0.0, *window[2:]), side)
     if pens:
         strokes = [shape for shape in painted if shape.element in pens or shape.is_stroked]
         ground = np.array(opaque_colour(background or choose_paper(strokes)))
         difference = np.abs(picture_of(framed) / 255 - ground).max(axis=2)
-        _paint_strokes(
-            painted, _plain_colours(root, walk.styles, painted), pens, page, matcher, ground=ground
-        )
+        _paint_strokes(painted, _plain_colours(painted, walk), pens, page, matcher, ground=ground)
         curves = _trace_strokes(framed, page, window, unread, difference, has_choice=matcher is not None)
     else:
         is_line = np.array([_is_curvature_line(shape, matcher) for shape in shapes])
@@ -166,9 +164,7 @@ def _read_svg(data: bytes, labels: tuple[str, ...]) -> Curves:
     return curves
 
 
-def _flatten(
-    shapes: Sequence[PaintedShape], styles: Mapping[Element, Mapping[str, str]], window: Box
-) -> Element:
+def _flatten(shapes: Sequence[PaintedShape], window: Box) -> Element:
     """The shapes alone, without clips and masks, from the origin of a window on.
 
     Renderers compute in single precision, which is too coarse far away.
@@ -177,7 +173,7 @@ def _flatten(
     for shape in shapes:
         scale = shape.scale or 1.0
         data = path_data((shape.points - window[:2]) / scale)
-        style = ";".join(f"{key}:{value}" for key, value in styles[shape.element].items())
+        style = ";".join(f"{key}:{value}" for key, value in shape.style.items())
         shape.element.tag = SVG + "path"
         shape.element.attrib = {"d": data, "transform": f"scale({scale!r})", "style": style}
         root.append(shape.element)
@@ -205,8 +201,8 @@ def _area_of(shape: PaintedShape) -> float:
     """The area of a filled shape. By the even-odd rule, its largest loop surrounds the others."""
     loop = run_numbers(shape.points, np.zeros(len(shape.points), dtype=np.int32))
     (x, y), (u, v) = shape.points[:, 0].T, shape.points[:, 3].T
-    areas = np.bincount(loop, (x * v - u * y) / 2)
-    return float(2 * np.abs(areas).max() - np.abs(areas).sum() if shape.is_even_odd else abs(areas.sum()))
+    areas, is_even_odd = np.bincount(loop, (x * v - u * y) / 2), shape.style.get("fill-rule") == "evenodd"
+    return float(2 * np.abs(areas).max() - np.abs(areas).sum() if is_even_odd else abs(areas.sum()))
 
 
 def _paint_strokes(
@@ -241,32 +237,27 @@ def _paint_strokes(
         matcher.check(any_stroke=any_line)
 
 
-def _plain_colours(
-    root: Element, styles: Mapping[Element, Mapping[str, str]], shapes: Sequence[PaintedShape]
-) -> list[Floats]:
+def _plain_colours(shapes: Sequence[PaintedShape], walk: _ElementWalk) -> list[Floats]:
     """Red, green and blue in [0, 1] of the paint of each shape; of a gradient, the mean of its stops."""
-    named = {f"url(#{element.get('id')})": element for element in reversed(list(root.iter()))}
-    paints = {shape.paint: named.get(shape.paint) for shape in shapes}
     colours = {
-        paint: np.array(opaque_colour(paint[:7])) if server is None else _mean_of_stops(server, named, styles)
-        for paint, server in paints.items()
+        paint: _mean_of_stops(walk.named[paint[5:-1]], walk)
+        if paint.startswith("url(#")
+        else np.array(opaque_colour(paint[:7]))
+        for paint in {shape.paint for shape in shapes}
     }
     return [colours[shape.paint] for shape in shapes]
 
 
-def _mean_of_stops(
-    server: Element, named: Mapping[str, Element], styles: Mapping[Element, Mapping[str, str]]
-) -> Floats:
+def _mean_of_stops(server: Element, walk: _ElementWalk) -> Floats:
     """The mean colour of a gradient, whose stops another one may have; not numbers without stops."""
+    linked: Element | None = server
     for _ in range(MAX_DEPTH):
-        stops = [child for child in server[:_MOST_STOPS] if tag_of(child) == "stop"]
-        links = [named[link] for key in HREFS if (link := f"url({server.get(key, '')})") in named]
-        if stops:
-            colours = [opaque_colour(styles[stop].get("stop-color", "#000000")[:7]) for stop in stops]
-            return np.asarray(np.mean(colours, axis=0))
-        if not links:
+        if linked is None:
             break
-        server = links[0]
+        if stops := [child for child in linked[:_MOST_STOPS] if tag_of(child) == "stop"]:
+            colours = [opaque_colour(walk.styles[stop].get("stop-color", "#000000")[:7]) for stop in stops]
+            return np.asarray(np.mean(colours, axis=0))
+        linked = walk.linked(linked)
     return np.full(3, np.nan)
 
 
@@ -521,7 +512,7 @@ class _ElementWalk:
 
     styles: of every element, without what it inherits. faults: of shapes, with their names. unused: an
     element and its transform, for each that is not understood. finest: least width that is seen. reach: the
-    greatest coordinate in units of the page. inherited: the styles of shapes with what they inherit.
+    greatest coordinate in units of the page. named: elements by their ids.
     """
 
     styles: dict[Element, dict[str, str]]
@@ -529,19 +520,18 @@ class _ElementWalk:
     unused: dict[Element, str] = field(default_factory=dict)
     outlines: dict[Any, Floats] = field(default_factory=dict)
     faults: list[str] = field(default_factory=list)
-
+    named: dict[str, Element] = field(default_factory=dict)
     visited: int = 0
     used: int = 0
     curves: int = 0
     finest: float = 0.0
     reach: float = 0.0
-    inherited: dict[Element, dict[str, str]] = field(default_factory=dict)
 
     def shapes(self, root: Element, page: DrawingPage | None) -> Iterator[PaintedShape]:
         """Every painted shape in drawing order. Replaces each `use` by a group of what it shows."""
         from svgelements import Matrix
 
-        named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
+        self.named = {element.get("id", ""): element for element in reversed(list(root.iter()))}
         view, box = (page.view, page.box) if page else (UNPAGED, UNPAGED)
         self.finest = _FINEST * max(box[2:]) if page else 0.0
         stack = [_Place(root, _START, Matrix.scale(box[2] / view[2], box[3] / view[3]), view[2:])]
@@ -558,10 +548,10 @@ class _ElementWalk:
             if place.style.get("display") == "none" or number_of(place.style.get("opacity")) == 0:
                 continue
             if tag in SHAPES:
-                yield from self._painted_shape(place, named)
+                yield from self._painted_shape(place)
                 continue
             if tag == "use":
-                place = self._expand_use(place, named)
+                place = self._expand_use(place)
             elif tag not in _CONTAINERS:
                 continue
             elif tag == "svg" and element is not root:
@@ -584,21 +574,25 @@ class _ElementWalk:
         taken = self.matcher is not None and self.matcher.matches(labels_of(tag_of(element), element.attrib))
         return replace(place, style=style, matrix=matrix, chosen=taken or place.chosen)
 
-    def _expand_use(self, place: _Place, named: Mapping[str, Element]) -> _Place:
+    def linked(self, element: Element) -> Element | None:
+        """The element of the drawing to which another one refers; None for those of other files."""
+        link = next((element.get(key, "") for key in HREFS if key in element.attrib), "")
+        return self.named.get(link[1:]) if link.startswith("#") else None
+
+    def _expand_use(self, place: _Place) -> _Place:
         """The place of a `use` that became a group of what it shows: nothing of another file or of itself."""
         self.used += 1
         if self.used > MAX_USES:
             raise InputError(f"draws more than {MAX_USES} <use> elements; expand them in the drawing program")
         element, style = place.element, self.styles[place.element]
-        link = next((element.get(key, "") for key in HREFS if key in element.attrib), "")
+        target = self.linked(element)
         x, y = (
             length_of(element.get(key, ""), 0.0, side) for key, side in zip("xy", place.size, strict=True)
         )
         sides, kept = (chosen_attributes(element, keys) for keys in (("width", "height"), GROUP))
         element.clear()
         element.tag, element.attrib = SVG + "g", kept
-        target = named.get(link[1:]) if link.startswith("#") else None
-        if target is None or link in place.links:
+        if target is None or target in place.copied:
             return place
         copy = deepcopy(target)
         self.styles.update(
@@ -611,12 +605,12 @@ class _ElementWalk:
         self.styles[moved] = {}
         moved.append(copy)
         self.styles[element] = style
-        return replace(place, links=(*place.links, link))
+        return replace(place, copied=(*place.copied, target))
 
-    def _painted_shape(self, place: _Place, named: Mapping[str, Element]) -> Iterator[PaintedShape]:
+    def _painted_shape(self, place: _Place) -> Iterator[PaintedShape]:
         """The shape of an element, if it is painted."""
         style = place.style
-        stroke, fill = (_paint(style, kind, named) for kind in ("stroke", "fill"))
+        stroke, fill = (_paint(style, kind, self.named) for kind in ("stroke", "fill"))
         if style["visibility"] in ("hidden", "collapse") or not (stroke or fill):
             return
         scale = float(np.sqrt(abs(place.matrix.determinant)))
@@ -626,17 +620,16 @@ class _ElementWalk:
         if stroke and width < self.finest:
             self.faults.append(f"{name_of(place.element)}: its stroke is too thin to be seen")
             return
-        self.inherited[place.element] = {key: style[key] for key in _INHERITED if key in style}
         yield PaintedShape(
             place.element,
             name_of(place.element),
             self._place_shape(place),
             stroke or fill or "",
+            {key: style[key] for key in _INHERITED if key in style},
             width=width if stroke else 0.0,
             scale=scale,
             is_stroked=bool(stroke),
             is_filled=bool(fill),
-            is_even_odd=style.get("fill-rule") == "evenodd",
             chosen=place.chosen,
         )
 

@@ -9,7 +9,7 @@ shows, a second picture, with a flat colour for each shape, tells which one is i
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Final
 from xml.etree.ElementTree import Element, tostring
@@ -40,20 +40,20 @@ class PaintedShape:
     """A painted shape of a drawing.
 
     points: (k, 4, 2), control points of its centre line in the units of the page, none for an area. paint: of
-    its stroke, or else of its fill, as #rrggbb, #rrggbbaa or url(#id). width: of its stroke in units of the
-    page. scale: units of the page per unit of the element. is_even_odd: the rule of its fill. chosen: whether
-    it has a chosen label.
+    its stroke, or else of its fill, as #rrggbb, #rrggbbaa or url(#id). style: with what it inherits. width:
+    of its stroke in units of the page. scale: units of the page per unit of the element. chosen: whether it
+    has a chosen label.
     """
 
     element: Element
     name: str
     points: Floats
     paint: str
+    style: Mapping[str, str]
     width: float
     scale: float
     is_stroked: bool
     is_filled: bool
-    is_even_odd: bool
     chosen: bool
 
     @property
