@@ -73,7 +73,7 @@ class Seen:
     """
 
     points: Floats
-    shape: Indices
+    shape: Ints
     line: Ints
     colour: Floats
     strength: Floats
@@ -358,4 +358,5 @@ def _collect(
             strength[number] = difference**2 * shapes[number].width
         if not (np.abs(median - rgb[number]) <= _SAME).all():
             rgb[number] = median
-    return Seen(parts, samples.shape[starts], samples.run[starts], np.nan_to_num(rgb), strength)
+    owner = samples.shape[starts].astype(np.int32)
+    return Seen(parts, owner, samples.run[starts], np.nan_to_num(rgb), strength)
