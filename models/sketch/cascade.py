@@ -46,12 +46,12 @@ _Declared = tuple[str, str, bool]
 class Cascade:
     """The rules of a drawing.
 
-    combinators: of each selector, by its order, how often it tries all ancestors and all siblings. unread: an
-    element and its colour, for each colour that cannot be read. skipped: rules that are not read.
+    matcher: of selectors, with the declarations of each, and how often it tries all ancestors and all
+    siblings. unread: an element and its colour, for each colour that cannot be read. skipped: rules that are
+    not read.
     """
 
     matcher: Any
-    combinators: dict[int, tuple[int, int]] = field(default_factory=dict)
     unread: dict[Element, str] = field(default_factory=dict)
     skipped: list[str] = field(default_factory=list)
     checks: int = 0
@@ -77,9 +77,9 @@ class Cascade:
         element = wrapper.etree_element
         yield from ((key, element.attrib[key], False) for key in sorted(ATTRIBUTES & element.attrib.keys()))
         declared: list[_Declared] = []
-        if self.combinators:
+        if self.matcher.order:
             self._count(wrapper)
-            for *_, pseudo, declarations in self.matcher.match(wrapper):
+            for *_, pseudo, (declarations, _) in self.matcher.match(wrapper):
                 declared += declarations if pseudo is None else ()
         declared += style_declarations(element.get("style", ""))
         yield from sorted(declared, key=lambda declaration: declaration[2])
@@ -88,14 +88,13 @@ class Cascade:
         """Count the comparisons for an element. Raises InputError beyond MAX_RULE_CHECKS."""
         ancestors, siblings = 1 + sum(1 for _ in wrapper.ancestors), 1 + wrapper.index
         matcher = self.matcher
-        lists = [
-            matcher.other_selectors,
-            matcher.lower_local_name_selectors.get(wrapper.local_name.lower(), ()),
+        entries = [
+            *matcher.other_selectors,
+            *matcher.lower_local_name_selectors.get(wrapper.local_name.lower(), ()),
+            *(entry for name in wrapper.classes for entry in matcher.class_selectors.get(name, ())),
+            *matcher.id_selectors.get(wrapper.id, ()),
         ]
-        lists += [matcher.class_selectors.get(name, ()) for name in wrapper.classes]
-        lists.append(matcher.id_selectors.get(wrapper.id, ()))
-        tries = (self.combinators[entry[2]] for entries in lists for entry in entries)
-        self.checks += sum(ancestors**up * siblings**along for up, along in tries)
+        self.checks += sum(ancestors**up * siblings**along for *_, (_, (up, along)) in entries)
         if self.checks > MAX_RULE_CHECKS:
             raise InputError(
                 f"its style sheets take more than {MAX_RULE_CHECKS} comparisons; export it without"
@@ -191,10 +190,9 @@ def _add_selector(cascade: Cascade, text: str, declared: tuple[_Declared, ...]) 
     # A comma in parentheses is part of a selector, whose combinators multiply.
     lists = groupby(prelude, lambda part: part == ",")
     parts = [_combinators(_text(list(part))) for is_comma, part in lists if not is_comma]
-    bounds = np.max(parts, axis=0)
+    bounds = np.max(parts, axis=0).tolist()
     for selector in selectors:
-        cascade.matcher.add_selector(selector, declared)
-        cascade.combinators[cascade.matcher.order] = tuple(bounds.tolist())
+        cascade.matcher.add_selector(selector, (declared, bounds))
 
 
 def _combinators(selector: str) -> tuple[int, int]:
