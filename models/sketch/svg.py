@@ -413,21 +413,18 @@ def _mark_faint(curves: Curves, lines: Sequence[Ints], strength: Floats) -> Curv
 
 def _leave_box(points: Floats, number: Ints, low: Floats, high: Floats) -> Bools:
     """Which cubics (k,) are of straight lines that begin and end outside of a box, or in its corners."""
-    first = np.flatnonzero(np.diff(number, prepend=-1))
-    after = np.append(first[1:], len(number))
-    ends = np.stack([points[first, 0], points[after - 1, 3]], axis=1)
+    _, first, line = np.unique(number, return_index=True, return_inverse=True)
+    last = np.append(first[1:], len(number)) - 1
+    ends = np.stack([points[first, 0], points[last, 3]], axis=1)
     way = ends[:, 1] - ends[:, 0]
-    ahead, beside = (
-        np.repeat(way, after - first, axis=0),
-        points - np.repeat(ends[:, :1], after - first, axis=0),
-    )
-    across = np.abs(ahead[:, :1] * beside[..., 1] - ahead[:, 1:] * beside[..., 0]).max(axis=1)
+    beside = points - ends[line, :1]
+    across = np.abs(way[line, :1] * beside[..., 1] - way[line, 1:] * beside[..., 0]).max(axis=1)
     is_straight = np.maximum.reduceat(across, first) <= _ASIDE * (way**2).sum(axis=1)
     is_straight &= way.any(axis=1)
     room = _CORNER * (high - low)
     is_corner = ((ends < low + room) | (ends > high - room)).all(axis=2)
     is_outside = ((ends < low) | (ends > high)).any(axis=2) | is_corner
-    return np.repeat(is_straight & is_outside.all(axis=1), after - first)
+    return (is_straight & is_outside.all(axis=1))[line]
 
 
 def _are_crossed(points: Floats, number: Ints, weak: Bools, is_line: Bools) -> Bools:
@@ -565,7 +562,7 @@ class _ElementWalk:
         own = self.styles[element]
         inherited = {key: place.style[key] for key in _INHERITED if key in place.style}
         style = inherited | {key: value for key, value in own.items() if value != "inherit"}
-        matrix, transform = place.matrix, _transform(element, own, place.size, self.unused)
+        matrix, transform = place.matrix, self._own_transform(element, place.size)
         if transform is not None:
             matrix = transform * matrix
             terms = (getattr(transform, key) for key in "abcdef")
@@ -573,6 +570,36 @@ class _ElementWalk:
             element.attrib.pop("transform-origin", None)
         taken = self.matcher is not None and self.matcher.matches(labels_of(tag_of(element), element.attrib))
         return replace(place, style=style, matrix=matrix, chosen=taken or place.chosen)
+
+    def _own_transform(self, element: Element, size: tuple[float, float]) -> Any:
+        """The matrix of an element's own transform, about its origin; None without one. Raises InputError.
+
+        As in browsers, a transform that cannot be read moves nothing; it is added to `unused`.
+        """
+        from svgelements import Matrix
+
+        style = self.styles[element]
+        text = style.get("transform", element.get("transform", ""))
+        if not text or text == "none":
+            return None
+        if len(text) > MAX_TRANSFORM:
+            raise InputError(
+                f"{name_of(element)}: its transform has more than {MAX_TRANSFORM} characters; simplify it"
+            )
+        try:
+            matrix = Matrix(text)
+        except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError):
+            self.unused[element] = text
+            element.attrib.pop("transform", None)
+            return None
+        if origin := style.get("transform-origin", ""):
+            words = [*origin.lower().split(), "center"][:2]
+            if words[0] in ("top", "bottom") or words[1] in ("left", "right"):
+                words.reverse()
+            sides = (_SIDES.get(word, word) for word in words)
+            x, y = (length_of(side, 0.0, whole) for side, whole in zip(sides, size, strict=True))
+            matrix = Matrix.translate(-x, -y) * matrix * Matrix.translate(x, y)
+        return matrix
 
     def linked(self, element: Element) -> Element | None:
         """The element of the drawing to which another one refers; None for those of other files."""
@@ -623,7 +650,7 @@ class _ElementWalk:
         yield PaintedShape(
             place.element,
             name_of(place.element),
-            self._place_shape(place),
+            self._place_shape(place, scale),
             stroke or fill or "",
             {key: style[key] for key in _INHERITED if key in style},
             width=width if stroke else 0.0,
@@ -633,8 +660,8 @@ class _ElementWalk:
             chosen=place.chosen,
         )
 
-    def _place_shape(self, place: _Place) -> Floats:
-        """Control points (k, 4, 2) of a shape in the units of the result."""
+    def _place_shape(self, place: _Place, scale: float) -> Floats:
+        """Control points (k, 4, 2) of a shape in the units of the result; scale: of its own units there."""
         attributes, tag = place.element.attrib, tag_of(place.element)
         key = (
             tag,
@@ -657,41 +684,8 @@ class _ElementWalk:
                 f"{name_of(place.element)}: a coordinate is not a finite number below {GREATEST:g}"
             )
             return placed[:0]
-        scale = float(np.sqrt(abs(m.determinant)))
         self.reach = max(self.reach, scale * float(np.abs(points).max(initial=0.0)))
         return np.asarray(placed[(placed != placed[:, :1]).any(axis=(1, 2))])
-
-
-def _transform(
-    element: Element, style: Mapping[str, str], size: tuple[float, float], unused: dict[Element, str]
-) -> Any:
-    """The matrix of an element's own transform, about its origin; None without one. Raises InputError.
-
-    As in browsers, a transform that cannot be read moves nothing; it is added to `unused`.
-    """
-    from svgelements import Matrix
-
-    text = style.get("transform", element.get("transform", ""))
-    if not text or text == "none":
-        return None
-    if len(text) > MAX_TRANSFORM:
-        raise InputError(
-            f"{name_of(element)}: its transform has more than {MAX_TRANSFORM} characters; simplify it"
-        )
-    try:
-        matrix = Matrix(text)
-    except (ValueError, TypeError, IndexError, AttributeError, ArithmeticError):
-        unused[element] = text
-        element.attrib.pop("transform", None)
-        return None
-    if origin := style.get("transform-origin", ""):
-        words = [*origin.lower().split(), "center"][:2]
-        if words[0] in ("top", "bottom") or words[1] in ("left", "right"):
-            words.reverse()
-        sides = (_SIDES.get(word, word) for word in words)
-        x, y = (length_of(side, 0.0, whole) for side, whole in zip(sides, size, strict=True))
-        matrix = Matrix.translate(-x, -y) * matrix * Matrix.translate(x, y)
-    return matrix
 
 
 def _paint(style: Mapping[str, str], kind: str, named: Mapping[str, Element]) -> str | None:
