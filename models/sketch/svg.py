@@ -424,7 +424,7 @@ def _leave_box(points: Floats, number: Ints, low: Floats, high: Floats) -> Bools
     room = _CORNER * (high - low)
     is_corner = ((ends < low + room) | (ends > high - room)).all(axis=2)
     is_outside = ((ends < low) | (ends > high)).any(axis=2) | is_corner
-    return (is_straight & is_outside.all(axis=1))[line]
+    return np.asarray((is_straight & is_outside.all(axis=1))[line])
 
 
 def _are_crossed(points: Floats, number: Ints, weak: Bools, is_line: Bools) -> Bools:

@@ -86,7 +86,7 @@ class _LineSamples:
     shape, cubic, run: (s,), numbers of the shape, of its cubic among all, and of the unbroken run. start,
     end: (s,), parameters on the cubic between which a sample stands. place: (s, 2), in units of the page.
     pixels: (3, s), number of the picture's pixel there and to both sides; -1 off the page. length: (s,), in
-    pixels.
+    pixels. width: (n,), of the stroke of each shape in pixels, widened.
     """
 
     shape: Indices
@@ -97,6 +97,7 @@ class _LineSamples:
     place: Floats
     pixels: Indices
     length: Floats
+    width: Floats
 
 
 def see_strokes(
@@ -138,7 +139,7 @@ def see_strokes(
         number = np.arange(len(own))
         front = fronts[place, number]
         colour, difference, contrast, own = look(samples.pixels[place, number])
-        visible = _decide(samples, shapes, front, is_line, contrast=contrast, own=own, pixel=pixel)
+        visible = _decide(samples, front, is_line, contrast=contrast, own=own)
         # A stroke in the colour of its ground is none, and needs no note.
         notes = _describe_hidden(samples, shapes, ~visible & (front != 2 * samples.shape))
     colour[~_shows_colour(samples, visible & contrast, front, own)] = np.nan
@@ -233,8 +234,9 @@ def _sample_lines(shapes: Sequence[PaintedShape], window: Box, pixel: float) -> 
     wide, high = (max(1, round(side / pixel)) for side in window[2:])
     place = (at - window[:2]) / np.array(window[2:]) * (wide, high)
     way = evaluate_cubics(points[cubic], end) - evaluate_cubics(points[cubic], start)
-    width = np.maximum([shape.width / pixel for shape in shapes], _LEAST_WIDTH)[number[cubic]]
-    aside = way[:, ::-1] * (-1, 1) * (width / 4 / np.maximum(np.hypot(*way.T), 1e-300))[:, None]
+    width = np.maximum([shape.width / pixel for shape in shapes], _LEAST_WIDTH)
+    quarter = width[number[cubic]] / 4
+    aside = way[:, ::-1] * (-1, 1) * (quarter / np.maximum(np.hypot(*way.T), 1e-300))[:, None]
     pixels = []
     for spot in (place, place + aside, place - aside):
         # A line on the edge of the page shows half of its width.
@@ -250,6 +252,7 @@ def _sample_lines(shapes: Sequence[PaintedShape], window: Box, pixel: float) -> 
         at,
         np.stack(pixels),
         (ways[:-1] + ways[1:]) / 2,
+        width,
     )
 
 
@@ -292,21 +295,11 @@ def _make_opaque(root: Element) -> None:
             stack += element
 
 
-def _decide(
-    samples: _LineSamples,
-    shapes: Sequence[PaintedShape],
-    front: Indices,
-    is_line: Bools,
-    *,
-    contrast: Bools,
-    own: Bools,
-    pixel: float,
-) -> Bools:
+def _decide(samples: _LineSamples, front: Indices, is_line: Bools, *, contrast: Bools, own: Bools) -> Bools:
     """Which samples (s,) are visible."""
     is_crossed = contrast & ~own & (front >= 0) & (front % 2 == 0) & (front != 2 * samples.shape)
     state = np.where(is_crossed, _CROSSED, np.where(contrast, _VISIBLE, _HIDDEN))
-    width = np.maximum(np.array([shape.width for shape in shapes]) / pixel, _LEAST_WIDTH)
-    limit = np.where(is_crossed, _MEETING * width[front.clip(0) // 2], _GLITCH)
+    limit = np.where(is_crossed, _MEETING * samples.width[front.clip(0) // 2], _GLITCH)
     # A curvature line goes on below a line that cuts the field, as where both run along a silhouette.
     limit[is_crossed & is_line[samples.shape] & ~is_line[front.clip(0) // 2]] = np.inf
     starts = np.flatnonzero((np.diff(samples.run, prepend=-1) != 0) | (np.diff(state, prepend=-1) != 0))
@@ -358,5 +351,5 @@ def _collect(
             strength[number] = difference**2 * shapes[number].width
         if not (np.abs(median - rgb[number]) <= _SAME).all():
             rgb[number] = median
-    owner = samples.shape[starts].astype(np.int32)
-    return Seen(parts, owner, samples.run[starts], np.nan_to_num(rgb), strength)
+    numbers = samples.shape[starts].astype(np.int32)
+    return Seen(parts, numbers, samples.run[starts], np.nan_to_num(rgb), strength)
