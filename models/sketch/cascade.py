@@ -115,13 +115,11 @@ class Cascade:
             if UNSHOWN.match(name):
                 continue
             value = _replace_variables(text, variables) if "var(" in text else text.strip()
-            if name in _COLOURS:
-                colour = _paint_value(name, value)
-                if colour is None:
-                    self.unread[element] = text
-                    continue
-                value = colour
-            style[name] = value
+            paint = _paint_value(name, value) if name in _COLOURS else value
+            if paint is None:
+                self.unread[element] = text
+            else:
+                style[name] = paint
         return style
 
 
@@ -260,9 +258,5 @@ def _paint_value(name: str, text: str) -> str | None:
         return _INITIAL.get(name, "#000000") if lower == "initial" or name == "stop-color" else "inherit"
     if lower.startswith("url("):
         server, _, fallback = text.partition(")")
-        return (
-            server + ")"
-            if not fallback.strip()
-            else f"{server}) {_paint_value(name, fallback.strip()) or ''}"
-        )
+        return f"{server}) {_paint_value(name, fallback.strip()) or ''}".rstrip()
     return hex_colour(text)
