@@ -61,7 +61,7 @@ from .svg_page import (
     window_around,
 )
 from .thinning import join_ways, smooth_way, trace_shape
-from .visible import PaintedShape, Seen, choose_paper, opaque_colour, picture_of, see_strokes
+from .visible import PaintedShape, Seen, choose_paper, opaque_colour, picture_of, restyle, see_strokes
 
 _CONTAINERS: Final = frozenset({"g", "a", "svg", "switch"})
 _INHERITED: Final = (
@@ -201,8 +201,10 @@ def _area_of(shape: PaintedShape) -> float:
     """The area of a filled shape. By the even-odd rule, its largest loop surrounds the others."""
     loop = run_numbers(shape.points, np.zeros(len(shape.points), dtype=np.int32))
     (x, y), (u, v) = shape.points[:, 0].T, shape.points[:, 3].T
-    areas, is_even_odd = np.bincount(loop, (x * v - u * y) / 2), shape.style.get("fill-rule") == "evenodd"
-    return float(2 * np.abs(areas).max() - np.abs(areas).sum() if is_even_odd else abs(areas.sum()))
+    areas = np.bincount(loop, (x * v - u * y) / 2)
+    if shape.style.get("fill-rule") == "evenodd":
+        return float(2 * np.abs(areas).max() - np.abs(areas).sum())
+    return float(abs(areas.sum()))
 
 
 def _paint_strokes(
@@ -227,12 +229,9 @@ def _paint_strokes(
         is_pale = np.abs(colour - ground).max() <= PAPER
         any_line |= is_line and (is_pen or shape.is_stroked)
         ink = "#fff" if is_pale else "#f00" if is_line else "#000"
-        style = [
-            shape.element.get("style", ""),
-            f"stroke:{ink}" if shape.is_stroked else "",
-            f"fill:{ink if is_pen else '#fff'}" if shape.is_filled else "",
-        ]
-        shape.element.set("style", ";".join(filter(None, style)))
+        stroke = f";stroke:{ink}" if shape.is_stroked else ""
+        fill = f";fill:{ink if is_pen else '#fff'}" if shape.is_filled else ""
+        restyle(shape, shape.element.get("style", "") + stroke + fill)
     if matcher is not None:
         matcher.check(any_stroke=any_line)
 

@@ -112,11 +112,11 @@ def see_strokes(
     samples = _sample_lines(shapes, window, pixel)
     styles = [shape.element.get("style", "") for shape in shapes]
     for shape, style in zip(shapes, styles, strict=True):
-        _restyle(shape, style + _widened(shape, pixel))
+        restyle(shape, style + _widened(shape, pixel))
     shown, ground = picture_of(root, paper), None
     if any(shape.is_ground for shape in shapes):
         for shape, style in zip(shapes, styles, strict=True):
-            _restyle(shape, style + ";stroke:none" + ("" if shape.is_ground else ";fill:none"))
+            restyle(shape, style + ";stroke:none" + ("" if shape.is_ground else ";fill:none"))
         ground = picture_of(root, paper)
     paints = np.array([opaque_colour(shape.paint) for shape in shapes])
     expected = paints[samples.shape]
@@ -153,7 +153,7 @@ def _shows_colour(samples: _LineSamples, visible: Bools, front: Indices, own: Bo
     return np.asarray(in_front | (visible & ~has_some[samples.shape] & ((front < 0) | (front % 2 == 1))))
 
 
-def _restyle(shape: PaintedShape, style: str) -> None:
+def restyle(shape: PaintedShape, style: str) -> None:
     """Give a shape another style. resvg drops one that begins with a semicolon."""
     shape.element.set("style", style.lstrip(";"))
 
@@ -268,7 +268,7 @@ def _find_fronts(
         flat = ";opacity:1;stroke-opacity:1;fill-opacity:1"
         flat += f";stroke:{line}" if len(shape.points) else ""
         flat += f";fill:{area}" if shape.is_filled else ""
-        _restyle(shape, style + _widened(shape, pixel) + flat)
+        restyle(shape, style + _widened(shape, pixel) + flat)
     _make_opaque(root)
     picture = picture_of(root).reshape(-1, 3)
     known = {_flat_colour(number): number for number in range(2 * len(shapes))} | {0xFFFFFF: -1}
