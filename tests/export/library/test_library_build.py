@@ -323,9 +323,7 @@ def test_builds_in_one_folder_wait_for_one_another(small, tmp_path):
 
 def kill_worker(build_process):
     lines = command_lines()
-    workers = [
-        child for child in descendants(build_process) if b"processes.child_program" in lines.get(child, b"")
-    ]
+    workers = [each for each in descendants(build_process) if b".child_program" in lines.get(each, b"")]
     assert len(workers) == 2
     os.kill(workers[0], signal.SIGKILL)
 

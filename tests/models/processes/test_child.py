@@ -139,3 +139,12 @@ def test_the_second_interrupt_kills_the_work_and_is_raised(tmp_path):
         process.send_signal(signal.SIGINT)
         assert "KeyboardInterrupt" in process.communicate()[1]
     assert all_end(theirs)
+
+
+def test_a_child_whose_parent_is_gone_at_its_start_ends_without_a_word():
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, "-c", "from crossfield.models.processes.child_program import main; main()"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=writer, stderr=subprocess.PIPE) as process:
+        assert process.stderr.read() == b""
+    os.close(writer)
