@@ -257,7 +257,7 @@ def interrupted(folder, log, arguments, words, *, number=signal.SIGINT):
 
 
 CTRL_C = {
-    "highs": ["solve", "mouse", "-f", "milp-mccormick"],
+    "highs": ["solve", "mouse", "-f", "milp-mccormick", "--size", "14"],
     "ipopt": ["solve", "mouse", "-f", "miqcp-bilinear", "--relax", "--size", "40"],
     "bonmin": ["solve", "mouse", "-f", "miqp-exact", "--size", "12"],
 }
