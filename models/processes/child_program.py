@@ -84,7 +84,7 @@ def forget_stops() -> None:
 def main() -> None:
     """Answer each task from standard input by a message on standard output, until either closes."""
     tasks: queue.SimpleQueue[TaskMessage] = queue.SimpleQueue()
-    with suppress(BrokenPipeError), os.fdopen(os.dup(1), "wb") as answers:  # whose reader may be killed
+    with suppress(BrokenPipeError), os.fdopen(os.dup(1), "wb") as answers:  # the reader may have been killed
         os.dup2(2, 1)  # output of libraries is not an answer
         threading.Thread(target=_receive, args=(tasks,), daemon=True).start()
         send(b"", answers)  # all imports are done: time limits count from here

@@ -163,7 +163,8 @@ def test_layers_are_switched(browser, address):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("width, scheme", [(1280, "light"), (390, "dark")])
+@pytest.mark.parametrize("width", [1280, 390])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
 def test_it_fits_and_can_be_read(browser, address, width, scheme):
     show(browser, width=width, scheme=scheme)
     browser.get(address)
